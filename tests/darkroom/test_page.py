@@ -32,6 +32,10 @@ DISCARD = """async () => {
   await fetch('/api/discard', {method: 'POST', headers, body: JSON.stringify({project: project.name})}); }"""
 """Deletes the photo that a page shows."""
 
+PICK = (
+    """(n, colour) => { n.value = colour; n.dispatchEvent(new Event('input', {bubbles: true})); }"""
+)
+
 DROP = """([name, bytes]) => {
   const carried = new DataTransfer();
   carried.items.add(new File([Uint8Array.from(bytes)], name));
@@ -201,10 +205,7 @@ def test_sliders_numbers_colours_presets_and_the_divider(page):
     # A picked colour appears as it was picked, whatever hue was set before.
     slide(page, "hue", 120)
     becomes(page, green)
-    script = (
-        """(n) => { n.value = '#2040e0'; n.dispatchEvent(new Event('input', {bubbles: true})); }"""
-    )
-    page.locator(".colour input").first.evaluate(script)
+    page.locator(".colour input").first.evaluate(PICK, "#2040e0")
     becomes(page, lambda rgb: rgb[2] > rgb[1] + 40 and rgb[2] > rgb[0] + 40)
     page.wait_for_selector("#steps >> text=hue", state="hidden")
     # One from the photo, without the light on it: that of the grey wall.
@@ -430,6 +431,19 @@ def test_the_page_draws_changes_as_the_server_does(page):
     mine = seen(page, *inside)
     held.release()
     page.wait_for_selector("#steps >> text=metallic 0.5")
+    theirs = seen(page, *inside)
+    assert np.abs(mine - theirs).max() <= 8 and np.abs(mine - theirs).mean() < 3
+    # --- A new colour keeps the fine shading, here and there ---
+    held = Held(page, "set")
+    page.locator(".colour input").first.evaluate(PICK, "#3060c0")
+    slide(page, "metallic", 0.3)
+    until(
+        page,
+        "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))",
+    )
+    mine = seen(page, *inside)
+    held.release()
+    page.wait_for_selector("#steps >> text=metallic 0.3")
     theirs = seen(page, *inside)
     assert np.abs(mine - theirs).max() <= 8 and np.abs(mine - theirs).mean() < 3
     # --- A lamp that is dragged: without the server its light goes along ---

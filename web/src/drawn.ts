@@ -95,6 +95,8 @@ class Material {
     const { header, arrays } = this.block;
     const { diffuse, specular, base, photo, colour, albedo, roughness, metallic, weight } = arrays as Record<string, Numbers>;
     const { gain, lit, added, fitted_metallic: fitted } = arrays as Record<string, Numbers>;
+    const { gloss, paint_shade: paintShade, metal_shade: metalShade } = arrays as Record<string, Numbers>;
+    const limits = header.shade_limits as number[];
     const at = arrays.at as Uint32Array;
     const count = header.count as number;
     const levels = header.levels as number[];
@@ -104,6 +106,7 @@ class Material {
     const [turn, sat, val] = ["hue", "saturation", "value"].map((name) => Number(options[name] ?? 0)) as [number, number, number];
     const shifts = turn !== 0 || sat !== 0 || val !== 0;
     const plain = given(options.albedo) ? this.plainOf(String(options.albedo)) : null;
+    const painted = plain !== null || (header.textured as boolean);
     const [rough, metal] = [setter(options.roughness), setter(options.metallic)];
     const now = [0, 0, 0];
     let [known, low, part] = [NaN, 0, 0];
@@ -114,6 +117,14 @@ class Material {
       else for (let c = 0; c < 3; c++) now[c] = plain ? plain.rgb[c]! : colour![3 * i + c]!;
       let r = rough(roughness![i]!);
       let m = metal(metallic![i]!);
+      // --- A new colour keeps fine shading and white gloss: `edits.material.material.edit` ---
+      if (painted) {
+        const brightest = Math.max(now[0]!, now[1]!, now[2]!, 1e-6);
+        const limit = Math.max(1, brightest * (limits[0]! + m * (limits[1]! - limits[0]!)));
+        const shade = Math.min((paintShade![i]! + m * (metalShade![i]! - paintShade![i]!)) / limit, 1 / brightest);
+        const white = (1 - m) * gloss![i]!;
+        for (let c = 0; c < 3; c++) now[c] = now[c]! * shade + white * (1 - now[c]! * shade);
+      }
       if (w < 1) {
         for (let c = 0; c < 3; c++) now[c] = albedo![3 * i + c]! + (now[c]! - albedo![3 * i + c]!) * w;
         r = roughness![i]! + (r - roughness![i]!) * w;

@@ -20,7 +20,8 @@ from materialist.edits.core.operation import REGION
 from materialist.edits.insert.operation import INSERT
 from materialist.edits.light.relight import SETTINGS as LAMPS
 from materialist.edits.light.relight import kelvin_colour
-from materialist.edits.material.material import base_colour, changed, weight_of
+from materialist.edits.material.detail import UNCLIPPED, highlights, shading_detail
+from materialist.edits.material.material import base_colour, changed, core_of, weight_of
 from materialist.edits.material.normals import is_metal
 from materialist.edits.material.operation import EDIT
 from materialist.edits.recipe import Step, options_of
@@ -183,6 +184,10 @@ def _material(live: LivePreview, drawing: Drawing) -> Made:
     pixels = rows.pop("pixels")
     materials = before.materials
     colour, texture = base_colour(before, weight, options)
+    # What a new colour keeps, as paint and as metal: `edits.material.material.edit`.
+    core = core_of(weight)
+    gloss = options.detail * highlights(before, core)
+    shades = [shading_detail(before, core, options.detail, white) for white in (gloss, 0.0)]
     box = window(inside)
     top, left = box[0].start, box[1].start
     height, width = inside[box].shape
@@ -195,6 +200,9 @@ def _material(live: LivePreview, drawing: Drawing) -> Made:
         "metallic": materials.metallic,
         "fitted_metallic": live.scene.materials.metallic,
         "weight": weight,
+        "gloss": gloss,
+        "paint_shade": shades[0],
+        "metal_shade": shades[1],
     }
     over = _over(live, drawing, rest)
     rows |= {
@@ -207,6 +215,8 @@ def _material(live: LivePreview, drawing: Drawing) -> Made:
         "levels": ROUGHNESS_LEVELS,
         "r0": DIELECTRIC_R0,
         "floor": COMPOSITE.floor,
+        "textured": texture is not None,
+        "shade_limits": [float(np.quantile(shade[core], UNCLIPPED)) for shade in shades],
         "clipped": None if live.scene.photo.hdr else COMPOSITE.clipped_photo,
         "overall": None if overall is None else overall.tolist(),
     }

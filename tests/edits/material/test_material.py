@@ -186,6 +186,44 @@ def test_a_new_colour_keeps_the_fine_shading_that_the_fit_put_into_the_albedo():
     np.testing.assert_allclose(half[:, 0] ** 2, deep[:, 0], rtol=1e-4)
 
 
+def glossy_scene(*, predicted: bool):
+    """Red paint with white stripes on a quarter of it, which the network calls paint or not; and where they are."""
+    paint = np.broadcast_to(np.float32([0.5, 0.1, 0.05]), SCENE.materials.albedo.shape)
+    stripes = np.zeros(MASK.shape, bool)
+    stripes[:, ::4] = True
+    fitted = np.where(stripes[..., None], paint + 0.3, paint).astype(np.float32)
+    prior = replace(SCENE.prior.materials, albedo=fitted if predicted else paint.copy())
+    materials = replace(SCENE.materials, albedo=fitted)
+    scene = replace(SCENE, materials=materials, prior=replace(SCENE.prior, materials=prior))
+    return scene, stripes
+
+
+def test_white_gloss_stays_white_on_a_new_colour():
+    blue = (0.05, 0.1, 0.4)
+    scene, stripes = glossy_scene(predicted=False)
+    new = edit(scene, MASK, albedo=blue).materials.albedo
+    np.testing.assert_allclose(
+        new[MASK & ~stripes], np.broadcast_to(blue, new[MASK & ~stripes].shape), rtol=0.02
+    )
+    # As much white as the old albedo had, laid over the paint; the ridge leaves some to the paint.
+    white = (new - np.array(blue))[MASK & stripes] / (1 - np.array(blue))
+    np.testing.assert_allclose(white, 0.3, atol=0.08)
+    assert np.ptp(white, axis=-1).max() < 0.06
+    # Again, in another colour, and not at all.
+    again = edit(edit(scene, MASK, albedo=blue), MASK, albedo=(0.1, 0.3, 0.1)).materials.albedo
+    np.testing.assert_allclose(again[MASK & stripes].min(), 0.1 + 0.3 * 0.9, atol=0.1)
+    flat = edit(scene, MASK, albedo=blue, detail=0).materials.albedo[MASK]
+    np.testing.assert_allclose(flat, np.broadcast_to(blue, flat.shape), atol=1e-6)
+
+
+@pytest.mark.parametrize("predicted, values", [(True, {}), (False, {"metallic": 1.0})])
+def test_white_paint_and_metal_take_the_whole_new_colour(predicted, values):
+    blue = np.array([0.05, 0.1, 0.4])
+    scene, stripes = glossy_scene(predicted=predicted)
+    new = edit(scene, MASK, albedo=tuple(blue), **values).materials.albedo[MASK & stripes]
+    np.testing.assert_allclose(new / new[:, 2:], np.broadcast_to(blue / 0.4, new.shape), rtol=1e-4)
+
+
 def test_a_bright_colour_is_darkened_until_the_fine_shading_has_room():
     shading = np.ones(MASK.shape)
     shading[:, ::3] = 1.6

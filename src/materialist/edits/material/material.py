@@ -11,7 +11,7 @@ from materialist.camera import unit, unproject
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.edits.core.notes import noted
 from materialist.edits.core.region import checked_region, reshaped
-from materialist.edits.material.detail import shaded, shading_detail
+from materialist.edits.material.detail import highlights, shaded, shading_detail
 from materialist.edits.material.normals import is_metal, with_metal_normals
 from materialist.edits.material.options import MaterialEdit, MaterialKeywords
 from materialist.errors import InputError
@@ -46,11 +46,15 @@ def edit(
     colour, texture = base_colour(scene, weight, changes)
     if changes.hue or changes.saturation or changes.value:
         colour = shifted_hsv(colour, changes.hue, changes.saturation, changes.value)
-    if changes.albedo is not None or changes.texture is not None:
-        region = weight > 0.5 if (weight > 0.5).any() else weight > 0
-        colour = shaded(colour, shading_detail(scene, region, changes.detail), region)
-    # Mixed by the weight, so that a feathered border fades.
     metallic = changed(materials.metallic, changes.metallic)
+    if changes.albedo is not None or changes.texture is not None:
+        region = core_of(weight)
+        # White gloss stays white; metal has a gloss of its own, and takes the old one as shading.
+        white = changes.detail * (1 - metallic) * highlights(scene, region)
+        factor = shading_detail(scene, region, changes.detail, white)
+        colour = shaded(colour, factor, region)
+        colour = colour + white[..., None] * (1 - colour)
+    # Mixed by the weight, so that a feathered border fades.
     new = Materials(
         _mix(materials.albedo, colour, weight[..., None]),
         _mix(materials.roughness, changed(materials.roughness, changes.roughness), weight),
@@ -101,6 +105,11 @@ def weight_of(scene: Scene, mask: Array, changes: MaterialEdit) -> Array:
     return region * (scene.depth > 0)
 
 
+def core_of(weight: Array) -> Array:
+    """[H, W] bool: the pixels of a weight [H, W] that say what its region looks like."""
+    return weight > 0.5 if (weight > 0.5).any() else weight > 0
+
+
 def base_colour(
     scene: Scene, weight: Array, changes: MaterialEdit
 ) -> tuple[Array, list[int] | None]:
@@ -113,7 +122,7 @@ def base_colour(
         picture = changes.texture
         if isinstance(picture, str | Path):
             picture = np.clip(decode_photo(Path(picture)).exposed(), 0, 1)
-        region = weight > 0.5 if (weight > 0.5).any() else weight > 0
+        region = core_of(weight)
         laid = projected(scene, region, picture, changes.texture_scale, turn=changes.texture_turn)
         return laid, list(np.shape(picture))
     if changes.albedo is not None:
