@@ -33,11 +33,13 @@ SHIFTS = {
 """The paper's "high" and "low" (Material Editing): what is shifted, and by how much."""
 MIN_SHIFT = 0.25
 """Smallest shift within [0, 1] for which an object is edited: the limits may leave less than the whole."""
-KINDS = ("hue", "metal", "relight", "insert", "glass", "remove", "glass cup", *SHIFTS)
+KINDS = ("hue", "metal", "relight", "insert", "glass", "remove", "glass cup", "paint", *SHIFTS)
 INSERTIONS = ("insert", "glass cup")
 SHADOW = 0.02
 """Change of the sRGB value from which a pixel counts as part of a shadow or reflection."""
 COPPER = (0.85, 0.45, 0.3)
+PAINT = (0.05, 0.2, 0.5)
+"""A new colour of a thing that stays as rough as it is."""
 LIFT = 0.002
 """Metres of air under true glass: where two surfaces are one, either may be met first."""
 
@@ -113,10 +115,11 @@ def _material(kind: str, item: Item) -> tuple[dict[str, Any], Item]:
         name, by = SHIFTS[kind]
         shifted: dict[str, Any] = {name: getattr(item, name) + np.sign(by) * _shift(item, kind)}
         return {name: f"{by:+g}"}, replace(item, **shifted)
-    # Copper.
-    colour = np.broadcast_to(np.array(COPPER, np.float32), item.albedo.shape).copy()
-    values = {"albedo": COPPER, "metallic": 1.0, "roughness": 0.3}
-    return values, replace(item, albedo=colour, metallic=1.0, roughness=0.3)
+    # Copper, or another paint.
+    albedo = PAINT if kind == "paint" else COPPER
+    surface = {} if kind == "paint" else {"metallic": 1.0, "roughness": 0.3}
+    colour = np.broadcast_to(np.array(albedo, np.float32), item.albedo.shape).copy()
+    return {"albedo": albedo, **surface}, replace(item, albedo=colour, **surface)
 
 
 def _shift(item: Item, kind: str) -> float:
