@@ -115,11 +115,14 @@ def _material(kind: str, item: Item) -> tuple[dict[str, Any], Item]:
         name, by = SHIFTS[kind]
         shifted: dict[str, Any] = {name: getattr(item, name) + np.sign(by) * _shift(item, kind)}
         return {name: f"{by:+g}"}, replace(item, **shifted)
-    # Copper, or another paint.
+    # --- Another paint, or copper ---
     albedo = PAINT if kind == "paint" else COPPER
-    surface = {} if kind == "paint" else {"metallic": 1.0, "roughness": 0.3}
     colour = np.broadcast_to(np.array(albedo, np.float32), item.albedo.shape).copy()
-    return {"albedo": albedo, **surface}, replace(item, albedo=colour, **surface)
+    painted = replace(item, albedo=colour)
+    if kind == "paint":
+        return {"albedo": PAINT}, painted
+    values = {"albedo": COPPER, "metallic": 1.0, "roughness": 0.3}
+    return values, replace(painted, metallic=1.0, roughness=0.3)
 
 
 def _shift(item: Item, kind: str) -> float:
