@@ -66,7 +66,7 @@ class Layers:
     relit: bool = False
     """Whether the light is another one."""
     native: NativeLayer | None = None
-    """New bodies at native size, which stand before all this; the maps above show what is behind them."""
+    """New bodies at native size, which stand before all this; under them the maps above go on from what is beside."""
     diffuse: Array | None = None
     """[H, W] in [0, 1]: what new metal leaves of the diffuse light, in which the photo's own texture is; None: all."""
     covered: Array | None = None
@@ -206,11 +206,13 @@ def difference(
             added = traced(half - probe_paths, k + 2, near, near)
             share = (half - probe_paths) / half * near[..., None]
             pair = [old + share * (new - old) for old, new in zip(pair, added, strict=True)]
-        pair[1] = np.where(near[..., None], pair[1], pair[0])
-        pairs.append(
-            pair if shown_pixels.all() else [picture[nearest(shown_pixels)] for picture in pair]
-        )
+        pairs.append([pair[0], np.where(near[..., None], pair[1], pair[0])])
     options.tick("render", steps, steps)
+
+    # --- Hidden pixels have the values of what is shown beside them ---
+    if shown_pixels.any() and not shown_pixels.all():
+        source = nearest(shown_pixels)
+        pairs = [[picture[source] for picture in pair] for pair in pairs]
 
     # --- What the halves agree on is the edit, what they disagree on is noise ---
     (b0, e0), (b1, e1) = pairs
