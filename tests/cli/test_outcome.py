@@ -37,11 +37,15 @@ def test_an_error_of_the_library_names_flags(refused, tmp_path):
     assert "give --force" in refused("invert", "example:coffee", "-o", tmp_path / "a.scene")
 
 
-def test_a_library_cannot_swallow_ctrl_c_while_it_is_imported(tmp_path, monkeypatch, capsys):
+def test_a_library_cannot_swallow_ctrl_c_while_it_is_imported(
+    request, tmp_path, monkeypatch, capsys
+):
     swallow = "import signal\ntry:\n    signal.raise_signal(signal.SIGINT)\nexcept BaseException:\n    pass\n"
     (tmp_path / "greedy_library.py").write_text(swallow)
     monkeypatch.syspath_prepend(tmp_path)
-    before = signal.getsignal(signal.SIGINT)
+    before = signal.default_int_handler
+    old = signal.signal(signal.SIGINT, before)  # another test may have left its own
+    request.addfinalizer(lambda: signal.signal(signal.SIGINT, old))
     app = typer.Typer()
 
     @app.command()

@@ -36,6 +36,7 @@ def step(tmp_path):
     return Step("edit", {"mask": write_mask(tmp_path, block()), "hue": "120"}, tmp_path)
 
 
+@pytest.mark.slow  # the page's tests ask such a process, too
 def test_the_process_answers_and_ends_with_the_photo(live, step, tmp_path):
     # Selecting does not wait for the tables.
     assert live.call(views.selected, where={"click": (25, 24)})[24, 25]

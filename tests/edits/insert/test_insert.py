@@ -141,8 +141,8 @@ def test_the_shadow_goes_on_to_the_foot(box, grey):
     # Under the body its surroundings go on.
     layers = render_layers(renderer, edited, RenderOptions(64, denoise=False))
     assert layers.edited[body.inside == 1].min() > 0.05
-    out = composite(scene, edited, spp=128, denoise=False)
-    base, plain = (picture(256, 3) for picture in renderer.pair(edited))
+    out = composite(scene, edited, spp=64, denoise=False)
+    base, plain = (picture(64, 3) for picture in renderer.pair(edited))
     expected = scene.photo.original * plain / base
     np.testing.assert_allclose(out[foot].mean(), expected[foot].mean(), rtol=0.03)
 
