@@ -120,7 +120,7 @@ class Material {
       // --- A new colour keeps fine shading and white gloss: `edits.material.material.edit` ---
       if (painted) {
         const brightest = Math.max(now[0]!, now[1]!, now[2]!, 1e-6);
-        const limit = Math.max(1, brightest * (limits[0]! + m * (limits[1]! - limits[0]!)));
+        const limit = Math.max(1, (plain ? brightest : 1) * (limits[0]! + m * (limits[1]! - limits[0]!)));
         const shade = Math.min((paintShade![i]! + m * (metalShade![i]! - paintShade![i]!)) / limit, 1 / brightest);
         const white = (1 - m) * gloss![i]!;
         for (let c = 0; c < 3; c++) now[c] = now[c]! * shade + white * (1 - now[c]! * shade);

@@ -188,6 +188,8 @@ def _material(live: LivePreview, drawing: Drawing) -> Made:
     core = core_of(weight)
     gloss = options.detail * highlights(before, core)
     shades = [shading_detail(before, core, options.detail, white) for white in (gloss, 0.0)]
+    # A texture is darkened by one number; a plain colour by its own brightness times this.
+    texels = colour.max(-1) if texture is not None else 1.0
     box = window(inside)
     top, left = box[0].start, box[1].start
     height, width = inside[box].shape
@@ -216,7 +218,7 @@ def _material(live: LivePreview, drawing: Drawing) -> Made:
         "r0": DIELECTRIC_R0,
         "floor": COMPOSITE.floor,
         "textured": texture is not None,
-        "shade_limits": [float(np.quantile(shade[core], UNCLIPPED)) for shade in shades],
+        "shade_limits": [float(np.quantile((texels * shade)[core], UNCLIPPED)) for shade in shades],
         "clipped": None if live.scene.photo.hdr else COMPOSITE.clipped_photo,
         "overall": None if overall is None else overall.tolist(),
     }

@@ -127,6 +127,19 @@ def test_the_matte_is_the_bodys_outline_at_native_size(box, bump):
     assert soft.sum() < 2.2 * ConvexHull(place * 4).area  # one native pixel wide
 
 
+def test_what_was_rendered_before_changes_nothing(box):
+    scene = floor_scene(64, 48)
+    first = insert(scene, box, (20.0, 30.0))
+    edited = insert(scene, box, (36.0, 30.0))
+    options = RenderOptions(16, denoise=False)
+    fresh = render_layers(EditRenderer(scene), edited, options)
+    used = EditRenderer(scene)
+    render_layers(used, first, options)
+    again = render_layers(used, edited, options)
+    np.testing.assert_array_equal(again.reached, fresh.reached)
+    np.testing.assert_array_equal(again.edited - again.base, fresh.edited - fresh.base)
+
+
 @pytest.mark.parametrize("grey", [0.05, 0.9])
 def test_the_shadow_goes_on_to_the_foot(box, grey):
     """What a body leaves of its rim's pixels is the ground in its shadow: neither the body nor the ground beside."""

@@ -216,6 +216,26 @@ def test_white_gloss_stays_white_on_a_new_colour():
     np.testing.assert_allclose(flat, np.broadcast_to(blue, flat.shape), atol=1e-6)
 
 
+def test_paint_of_an_earlier_edit_is_no_gloss():
+    scene, stripes = glossy_scene(predicted=True)
+    white = edit(scene, MASK & stripes, albedo=(0.9, 0.9, 0.9))
+    grey = edit(scene, MASK & stripes, saturation=-1.0)
+    blue = (0.05, 0.1, 0.4)
+    for earlier in (white, grey):
+        new = edit(earlier, MASK, albedo=blue).materials.albedo[MASK]
+        np.testing.assert_allclose(new, np.broadcast_to(blue, new.shape), rtol=0.02)
+
+
+def test_another_hue_that_the_fit_brightened_is_no_gloss():
+    scene, stripes = glossy_scene(predicted=True)
+    scene.prior.materials.albedo[stripes] = (0.05, 0.06, 0.4)
+    scene.materials.albedo[stripes] = (0.08, 0.1, 0.7)
+    new = edit(scene, MASK, albedo=(0.1, 0.4, 0.1)).materials.albedo[MASK & stripes]
+    np.testing.assert_allclose(
+        new / new[:, 1:2], np.broadcast_to((0.25, 1, 0.25), new.shape), rtol=0.2
+    )
+
+
 @pytest.mark.parametrize("predicted, values", [(True, {}), (False, {"metallic": 1.0})])
 def test_white_paint_and_metal_take_the_whole_new_colour(predicted, values):
     blue = np.array([0.05, 0.1, 0.4])

@@ -176,8 +176,10 @@ def difference(
 
     def traced(paths: int, seed: int, of_base: Array, of_edited: Array) -> tuple[Array, Array]:
         options.tick("render", next(done), steps)
-        return base(paths, seed, of_base & shown_pixels), edited(
-            paths, seed, of_edited & shown_pixels
+        # Pictures may have more than is asked for.
+        return (
+            base(paths, seed, of_base & shown_pixels) * shown_pixels[..., None],
+            edited(paths, seed, of_edited & shown_pixels) * shown_pixels[..., None],
         )
 
     # --- Probe: where does the edit reach beyond the pixels that it replaces? ---
@@ -187,6 +189,7 @@ def difference(
         lattice = np.zeros_like(changed)
         lattice[::step, ::step] = True
         few = [p[::step, ::step] for k in seeds for p in traced(probe_paths, k, lattice, lattice)]
+        few = _filled(few, shown_pixels[::step, ::step])
         # Parts that chance makes are as large as a window or two.
         large = remove_small_objects(_gain(*few) > 0, max_size=2 * SETTINGS.window**2 // step**2)
         near = (
@@ -210,9 +213,7 @@ def difference(
     options.tick("render", steps, steps)
 
     # --- Hidden pixels have the values of what is shown beside them ---
-    if shown_pixels.any() and not shown_pixels.all():
-        source = nearest(shown_pixels)
-        pairs = [[picture[source] for picture in pair] for pair in pairs]
+    pairs = [_filled(pair, shown_pixels) for pair in pairs]
 
     # --- What the halves agree on is the edit, what they disagree on is noise ---
     (b0, e0), (b1, e1) = pairs
@@ -238,6 +239,14 @@ def difference(
     reached = differs & (gain > 0)
     e = np.where(reached[..., None], b + (e - b) * gain[..., None], b)
     return Layers(b, e, reached, changed & reached)
+
+
+def _filled(pictures: list[Array], known: Array) -> list[Array]:
+    """The pictures [H, W, 3] with the values of the nearest known [H, W] bool pixel elsewhere."""
+    if known.all() or not known.any():
+        return pictures
+    source = nearest(known)
+    return [picture[source] for picture in pictures]
 
 
 def inner(hidden: Array) -> Array:

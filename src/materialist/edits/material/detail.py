@@ -3,6 +3,7 @@
 import numpy as np
 
 from materialist.color import luminance
+from materialist.geometry.silhouette import window
 from materialist.types import Array, Scene
 
 FLOOR = 0.02
@@ -11,6 +12,10 @@ LIMITS = (0.2, 2.0)
 """Of the factor; tuned by eye."""
 UNCLIPPED = 0.95
 """Share of a region that keeps its contrast; tuned by eye on four things in gold."""
+REGION_MARGIN = 8
+"""Pixels around a region in which its soft border lies."""
+DARK = 2e-3
+"""Added to albedos whose chromaticity counts: black has none."""
 MIN_WHITE = 0.03
 """Less is none, twice as much is whole: the fit adds a little anywhere; tuned on nine made objects."""
 WHITE_RIDGE = 0.03
@@ -20,28 +25,34 @@ WHITE_RIDGE = 0.03
 def highlights(scene: Scene, region: Array) -> Array:
     """[H, W] float32 in [0, 1]: white in the fitted albedo that the predicted one lacks, beyond its median.
 
-    The network predicts the paint, white patterns included; the fit leaves mirrored light in the albedo.
+    The network predicts the paint, white patterns included; the fit leaves mirrored light in the albedo. By the
+    dichromatic model (Shafer 1985) albedo = s paint + w white; the paint has the median chromaticity of the region
+    [H, W] bool. 0 away from the region.
     """
-    fitted = white_share(scene.materials.albedo, region)
-    added = fitted - white_share(scene.prior.materials.albedo, region)
-    added = np.clip(added - max(float(np.median(added[region])), 0), 0, 1)
-    return (added * np.clip(added / MIN_WHITE - 1, 0, 1)).astype(np.float32)
+    white = np.zeros(region.shape, np.float32)
+    box = window(region, margin=REGION_MARGIN)
+    fitted = scene.materials.albedo[box]
+    inside = region[box]
+    chroma = (fitted + DARK) / (luminance(fitted) + DARK)[..., None]
+    paint = np.median(chroma[inside], axis=0)
+    added = white_share(fitted, paint) - white_share(scene.prior.materials.albedo[box], paint)
+    added = np.clip(added - max(float(np.median(added[inside])), 0), 0, 1)
+    white[box] = added * np.clip(added / MIN_WHITE - 1, 0, 1)
+    return white
 
 
-def white_share(albedo: Array, region: Array) -> Array:
-    """[H, W] w of the dichromatic model (Shafer 1985), albedo [H, W, 3] = s paint + w white.
+def white_share(albedo: Array, paint: Array) -> Array:
+    """[...] w >= 0 of albedo [..., 3] = s paint + w white, s >= 0: least squares with a ridge on w.
 
-    The paint has the median chromaticity of the region [H, W] bool; least squares with w >= 0 and a ridge on it.
+    paint: [3], of any length.
     """
-    chroma = albedo / np.maximum(luminance(albedo)[..., None], FLOOR)
-    paint = np.median(chroma[region], axis=0)
-    paint = paint / max(float(np.linalg.norm(paint)), 1e-6)
+    paint = paint / np.linalg.norm(paint)
     white = np.full(3, 3**-0.5)
     # The normal equations, along unit vectors.
     along = float(paint @ white)
     share = (albedo @ white - along * (albedo @ paint)) / (1 + WHITE_RIDGE - along**2)
-    # No more than all of it; a channel has 1 / sqrt(3) of the vector.
-    return np.clip(share, 0, albedo @ white) * 3**-0.5
+    # No more than each channel has, or another hue would be white.
+    return np.clip(share * 3**-0.5, 0, albedo.min(-1))
 
 
 def shading_detail(

@@ -18,7 +18,7 @@ from materialist.errors import InputError
 from materialist.geometry.planes import axes
 from materialist.io.photo import decode_photo
 from materialist.option_kinds import documented
-from materialist.types import Array, Materials, Scene
+from materialist.types import Array, Materials, Prediction, Scene
 
 
 @documented(MaterialEdit)
@@ -29,8 +29,9 @@ def edit(
     **values: Unpack[MaterialKeywords],
 ) -> Scene:
     """The scene with other materials inside the mask; everything else, the photo included, is shared.
+    The prior takes the new paint as well, for later edits.
 
-    A new colour or texture keeps the photo's fine shading (`detail`, see `detail.shading_detail`).
+    A new colour or texture keeps the photo's fine shading and gloss (`detail`, see `detail.shading_detail`).
     Saturation and value keep the order of a texture: nothing clips, and grey stays grey. A number for roughness or
     metallic sets it, a text with a sign ("+0.5", "-0.5") shifts it; +-0.5 are the paper's high and low. Hue,
     saturation and value act on a new albedo or texture, too.
@@ -47,6 +48,7 @@ def edit(
     if changes.hue or changes.saturation or changes.value:
         colour = shifted_hsv(colour, changes.hue, changes.saturation, changes.value)
     metallic = changed(materials.metallic, changes.metallic)
+    prior = _predicted(scene, weight, colour, changes)
     if changes.albedo is not None or changes.texture is not None:
         region = core_of(weight)
         # White gloss stays white; metal has a gloss of its own, and takes the old one as shading.
@@ -62,7 +64,7 @@ def edit(
     )
     # --- Metal mirrors each bump of predicted normals: round bodies get smooth ones ---
     region = weight > 0.5
-    edited = replace(scene, materials=new)
+    edited = replace(scene, materials=new, prior=prior)
     if is_metal(metallic, region, changes):
         edited = with_metal_normals(edited, region)
     # --- What the provenance keeps: only what was asked for ---
@@ -103,6 +105,24 @@ def weight_of(scene: Scene, mask: Array, changes: MaterialEdit) -> Array:
     """[H, W] in [0, 1]: how much of the new material each pixel gets. Raises InputError as `edit` does."""
     region = reshaped(checked_region(scene, mask), changes.grow, changes.feather)
     return region * (scene.depth > 0)
+
+
+def _predicted(scene: Scene, weight: Array, colour: Array, changes: MaterialEdit) -> Prediction:
+    """The prior with the new paint, on which later edits find the fit's shading and gloss again.
+
+    colour: [H, W, 3] the new albedo, without the photo's shading.
+    """
+    old = scene.prior.materials.albedo
+    inside = weight > 0
+    if changes.albedo is not None or changes.texture is not None:
+        paint = colour
+    elif changes.hue or changes.saturation or changes.value:
+        paint = old.copy()
+        paint[inside] = shifted_hsv(old[inside], changes.hue, changes.saturation, changes.value)
+    else:
+        return scene.prior
+    albedo = _mix(old, paint, weight[..., None])
+    return replace(scene.prior, materials=replace(scene.prior.materials, albedo=albedo))
 
 
 def core_of(weight: Array) -> Array:
