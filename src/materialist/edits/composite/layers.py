@@ -176,10 +176,8 @@ def difference(
 
     def traced(paths: int, seed: int, of_base: Array, of_edited: Array) -> tuple[Array, Array]:
         options.tick("render", next(done), steps)
-        # Pictures may have more than is asked for.
-        return (
-            base(paths, seed, of_base & shown_pixels) * shown_pixels[..., None],
-            edited(paths, seed, of_edited & shown_pixels) * shown_pixels[..., None],
+        return base(paths, seed, of_base & shown_pixels), edited(
+            paths, seed, of_edited & shown_pixels
         )
 
     # --- Probe: where does the edit reach beyond the pixels that it replaces? ---
