@@ -616,10 +616,12 @@ UNNAMED = """() => [...document.querySelectorAll('button, input, select, [role=a
 
 
 def test_text_is_readable_and_things_have_names(page):
-    select_block(page)
     # Dark as the system says, then light as is chosen, which is remembered.
+    page.emulate_media(color_scheme="dark")
+    page.reload()  # an idle page may be told of another scheme much later
+    page.wait_for_selector(".marks")
+    select_block(page)
     for theme in ("dark", "light"):
-        page.emulate_media(color_scheme="dark")
         page.wait_for_selector(f"html[data-theme={theme}]")
         for name in ("Material", "Light", "Objects", "Look"):
             page.get_by_role("tab", name=name).click()
