@@ -136,9 +136,9 @@ def test_the_fitted_scene_comes_before_its_rerendering(folder, scene, stages):
     short = options(folder, settings="paper", steps=1, engine="path", spp=1)
     light = replace(short["settings"].light, height=16)
     short["settings"] = replace(short["settings"], light=light)
-    told = {}
-    invert(**short, on_stage=told.setdefault)
-    assert told and "scene" not in told
+    traced: dict = {}
+    invert(**short, on_stage=traced.setdefault)
+    assert traced and "scene" not in traced
 
 
 def test_equal_seeds_give_equal_scenes(folder, scene):

@@ -195,8 +195,8 @@ def test_select_writes_a_mask_that_edit_reads(done, folder, tmp_path, monkeypatc
     )
     np.testing.assert_array_equal(np.asarray(Image.open(tmp_path / "m.png"))[..., 0] == 255, MASK)
     # In place of MobileSAM, which takes seconds.
-    found = np.where(MASK, 1, -1)[None].repeat(3, 0).astype(np.float32)
-    monkeypatch.setattr(objects.sam, "masks", lambda *_, **__: (found, np.ones(3)))
+    logits = np.where(MASK, 1, -1)[None].repeat(3, 0).astype(np.float32)
+    monkeypatch.setattr(objects.sam, "masks", lambda *_, **__: (logits, np.ones(3)))
     done(*select, "--click", "17,17", "--native", "-o", tmp_path / "n.png")
     assert np.asarray(Image.open(tmp_path / "n.png"))[17, 17, 0] == 255
 

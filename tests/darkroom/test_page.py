@@ -408,6 +408,19 @@ class Held:
         self.page.wait_for_timeout(300)  # until it is decoded
 
 
+def same_by_the_server(page, held, step, inside):
+    """What the page has drawn is the server's picture but for the JPEG, when the held requests have made `step`."""
+    until(
+        page,
+        "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))",
+    )
+    mine = seen(page, *inside)
+    held.release()
+    page.wait_for_selector(f"#steps >> text={step}")
+    theirs = seen(page, *inside)
+    assert np.abs(mine - theirs).max() <= 8 and np.abs(mine - theirs).mean() < 3
+
+
 @pytest.mark.slow
 def test_the_page_draws_changes_as_the_server_does(page):
     # --- A material: by the same formula, so but for the JPEG the same picture ---
@@ -424,28 +437,12 @@ def test_the_page_draws_changes_as_the_server_does(page):
         ("metallic", 0.5),
     ):
         slide(page, name, value)
-    until(
-        page,
-        "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))",
-    )
-    mine = seen(page, *inside)
-    held.release()
-    page.wait_for_selector("#steps >> text=metallic 0.5")
-    theirs = seen(page, *inside)
-    assert np.abs(mine - theirs).max() <= 8 and np.abs(mine - theirs).mean() < 3
+    same_by_the_server(page, held, "metallic 0.5", inside)
     # --- A new colour keeps the fine shading, here and there ---
     held = Held(page, "set")
     page.locator(".colour input").first.evaluate(PICK, "#3060c0")
     slide(page, "metallic", 0.3)
-    until(
-        page,
-        "() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))",
-    )
-    mine = seen(page, *inside)
-    held.release()
-    page.wait_for_selector("#steps >> text=metallic 0.3")
-    theirs = seen(page, *inside)
-    assert np.abs(mine - theirs).max() <= 8 and np.abs(mine - theirs).mean() < 3
+    same_by_the_server(page, held, "metallic 0.3", inside)
     # --- A lamp that is dragged: without the server its light goes along ---
     page.get_by_role("tab", name="Light").click()
     page.locator("#stage").focus()
