@@ -20,8 +20,8 @@ from materialist.edits.core.operation import REGION
 from materialist.edits.insert.operation import INSERT
 from materialist.edits.light.relight import SETTINGS as LAMPS
 from materialist.edits.light.relight import kelvin_colour
-from materialist.edits.material.detail import UNCLIPPED, highlights, shading_detail
-from materialist.edits.material.material import base_colour, changed, core_of, weight_of
+from materialist.edits.material.detail import UNCLIPPED, core_of, highlights, shading_detail
+from materialist.edits.material.material import base_colour, changed, weight_of
 from materialist.edits.material.normals import is_metal
 from materialist.edits.material.operation import EDIT
 from materialist.edits.recipe import Step, options_of
@@ -186,7 +186,7 @@ def _material(live: LivePreview, drawing: Drawing) -> Made:
     colour, texture = base_colour(before, weight, options)
     # What a new colour keeps, as paint and as metal: `edits.material.material.edit`.
     core = core_of(weight)
-    gloss = options.detail * highlights(before, core)
+    gloss = options.detail * highlights(before, weight)
     shades = [shading_detail(before, core, options.detail, white) for white in (gloss, 0.0)]
     # A texture is darkened by one number; a plain colour by its own brightness times this.
     texels = colour.max(-1) if texture is not None else 1.0

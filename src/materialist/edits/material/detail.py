@@ -12,8 +12,6 @@ LIMITS = (0.2, 2.0)
 """Of the factor; tuned by eye."""
 UNCLIPPED = 0.95
 """Share of a region that keeps its contrast; tuned by eye on four things in gold."""
-REGION_MARGIN = 8
-"""Pixels around a region in which its soft border lies."""
 DARK = 2e-3
 """Added to albedos whose chromaticity counts: black has none."""
 MIN_WHITE = 0.03
@@ -22,17 +20,22 @@ WHITE_RIDGE = 0.03
 """Added to the square of white: of grey paint, which has the same direction, none is white; tuned by eye."""
 
 
-def highlights(scene: Scene, region: Array) -> Array:
+def core_of(weight: Array) -> Array:
+    """[H, W] bool: the pixels of a weight [H, W] that say what its region looks like."""
+    return weight > 0.5 if (weight > 0.5).any() else weight > 0
+
+
+def highlights(scene: Scene, weight: Array) -> Array:
     """[H, W] float32 in [0, 1]: white in the fitted albedo that the predicted one lacks, beyond its median.
 
     The network predicts the paint, white patterns included; the fit leaves mirrored light in the albedo. By the
     dichromatic model (Shafer 1985) albedo = s paint + w white; the paint has the median chromaticity of the region
-    [H, W] bool. 0 away from the region.
+    of a weight [H, W]; 0 where that is 0.
     """
-    white = np.zeros(region.shape, np.float32)
-    box = window(region, margin=REGION_MARGIN)
+    white = np.zeros(weight.shape, np.float32)
+    box = window(weight > 0)
     fitted = scene.materials.albedo[box]
-    inside = region[box]
+    inside = core_of(weight)[box]
     chroma = (fitted + DARK) / (luminance(fitted) + DARK)[..., None]
     paint = np.median(chroma[inside], axis=0)
     added = white_share(fitted, paint) - white_share(scene.prior.materials.albedo[box], paint)
@@ -42,7 +45,7 @@ def highlights(scene: Scene, region: Array) -> Array:
 
 
 def white_share(albedo: Array, paint: Array) -> Array:
-    """[...] w >= 0 of albedo [..., 3] = s paint + w white, s >= 0: least squares with a ridge on w.
+    """[...] w >= 0 of albedo [..., 3] = s paint + w white: least squares with a ridge on w.
 
     paint: [3], of any length.
     """

@@ -11,7 +11,7 @@ from materialist.camera import unit, unproject
 from materialist.color import linear_to_srgb, srgb_to_linear
 from materialist.edits.core.notes import noted
 from materialist.edits.core.region import checked_region, reshaped
-from materialist.edits.material.detail import highlights, shaded, shading_detail
+from materialist.edits.material.detail import core_of, highlights, shaded, shading_detail
 from materialist.edits.material.normals import is_metal, with_metal_normals
 from materialist.edits.material.options import MaterialEdit, MaterialKeywords
 from materialist.errors import InputError
@@ -29,6 +29,7 @@ def edit(
     **values: Unpack[MaterialKeywords],
 ) -> Scene:
     """The scene with other materials inside the mask; everything else, the photo included, is shared.
+
     The prior takes the new paint as well, for later edits.
 
     A new colour or texture keeps the photo's fine shading and gloss (`detail`, see `detail.shading_detail`).
@@ -52,7 +53,7 @@ def edit(
     if changes.albedo is not None or changes.texture is not None:
         region = core_of(weight)
         # White gloss stays white; metal has a gloss of its own, and takes the old one as shading.
-        white = changes.detail * (1 - metallic) * highlights(scene, region)
+        white = changes.detail * (1 - metallic) * highlights(scene, weight)
         factor = shading_detail(scene, region, changes.detail, white)
         colour = shaded(colour, factor, region)
         colour = colour + white[..., None] * (1 - colour)
@@ -123,11 +124,6 @@ def _predicted(scene: Scene, weight: Array, colour: Array, changes: MaterialEdit
         return scene.prior
     albedo = _mix(old, paint, weight[..., None])
     return replace(scene.prior, materials=replace(scene.prior.materials, albedo=albedo))
-
-
-def core_of(weight: Array) -> Array:
-    """[H, W] bool: the pixels of a weight [H, W] that say what its region looks like."""
-    return weight > 0.5 if (weight > 0.5).any() else weight > 0
 
 
 def base_colour(
