@@ -25,7 +25,7 @@ class BoundarySettings:
     # inverse depth at a pixel's corner stays within this factor of the pixel's own
     extrapolation: float = 2.0
     behind: float = 1e-3  # part of the depth by which a continued background lies behind the foreground, at least
-    # pixels by which a tuck that had to leave the background's vertex reaches under it
+    # pixels, at most, by which a tuck that had to leave the background's vertex reaches under it
     overlap: float = 0.02
     least_facing: float = 0.02  # least n . v of shading normals (89 degrees), so that every visible point can be shaded
 
@@ -257,7 +257,9 @@ def _tucks(
     loose = shared & (inverse > limit)
     # So moved, such a corner must stay behind the front face carried on to there, whose slope is at most this.
     slope = np.ptp(mean_inverse[front_vertex], axis=1, keepdims=True)
-    inverse = np.minimum(inverse, limit - 2 * SETTINGS.overlap * slope * loose)
+    # Less on a steep face: its inverse depth would pass through 0, and the tuck behind the camera.
+    overlap = np.minimum(SETTINGS.overlap, limit / np.maximum(4 * slope, 1e-300)) * loose
+    inverse = np.minimum(inverse, limit - 2 * overlap * slope)
     # A cut whose both ends are tips has not opened: there is no gap to close.
     torn = (shared & ~tip).any(1)
     screen = np.stack(
@@ -265,7 +267,7 @@ def _tucks(
     )
     # Diagonally, a moved corner would come out beside the nearer pixel.
     straight = (offset == 0).any(1)
-    screen = screen - SETTINGS.overlap * (loose & straight[:, None])[..., None] * offset[:, None]
+    screen = screen - (overlap * straight[:, None])[..., None] * offset[:, None]
     return screen[torn], inverse[torn], back[torn]
 
 
