@@ -187,7 +187,10 @@ def _material(live: LivePreview, drawing: Drawing) -> Made:
     # What a new colour keeps, as paint and as metal: `edits.material.material.edit`.
     core = core_of(weight)
     gloss = options.detail * highlights(before, weight)
-    shades = [shading_detail(before, core, options.detail, white) for white in (gloss, 0.0)]
+    shades = [
+        shading_detail(before, core, options.detail, metallic, white)
+        for metallic, white in ((0.0, gloss), (1.0, 0.0))
+    ]
     # A texture is darkened by one number; a plain colour by its own brightness times this.
     texels = colour.max(-1) if texture is not None else 1.0
     box = window(inside)

@@ -102,7 +102,8 @@ def test_texture_lies_upright_on_a_wall():
     picture = np.zeros((6, 32, 3), np.float32)
     picture[..., 0] = np.linspace(0.1, 0.9, 32)
     picture[..., 1] = np.linspace(0.2, 0.8, 6)[:, None]
-    albedo = edit(scene, wall, texture=picture).materials.albedo[4:10, 8:40]
+    new = edit(scene, wall, texture=picture, detail=0)
+    albedo = new.materials.albedo[4:10, 8:40]
     np.testing.assert_allclose(albedo[..., 0][:, 2:-2], picture[..., 0][:, 2:-2], atol=0.03)
     np.testing.assert_allclose(albedo[..., 1][1:-1], picture[..., 1][1:-1], atol=0.11)
     assert (np.diff(albedo[..., 1][1:-1], axis=0) > 0).all()
@@ -165,12 +166,25 @@ def test_a_texture_is_turned_clockwise_in_its_plane():
     assert (np.diff(laid(180), axis=1) > 0).mean() > 0.9
 
 
-def test_a_new_colour_keeps_the_fine_shading_that_the_fit_put_into_the_albedo():
+def shaded_scene(factor, *, predicted: bool = False):
+    """Brown paint times a factor [H, W] in the fitted albedo, and in the predicted one, or not."""
+    paint = np.broadcast_to(np.float32([0.3, 0.12, 0.05]), SCENE.materials.albedo.shape)
+    fitted = (paint * factor[..., None]).astype(np.float32)
+    prior = replace(SCENE.prior.materials, albedo=(fitted if predicted else paint).copy())
+    materials = replace(SCENE.materials, albedo=fitted)
+    return replace(SCENE, materials=materials, prior=replace(SCENE.prior, materials=prior))
+
+
+def grooves():
+    """[H, W] factors: dark on every fourth column."""
     groove = np.ones(MASK.shape, np.float32)
     groove[:, ::4] = 0.6
-    old = SCENE.prior.materials
-    fitted = replace(SCENE.materials, albedo=(old.albedo * groove[..., None]).astype(np.float32))
-    scene = replace(SCENE, materials=fitted)
+    return groove
+
+
+def test_a_new_colour_keeps_the_fine_shading_that_the_fit_put_into_the_albedo():
+    groove = grooves()
+    scene = shaded_scene(groove)
     gold = (1.0, 0.56, 0.08)
     new = edit(scene, MASK, albedo=gold, metallic=1).materials.albedo
     # Dark grooves stay dark, in the hue of the new colour.
@@ -184,6 +198,23 @@ def test_a_new_colour_keeps_the_fine_shading_that_the_fit_put_into_the_albedo():
     np.testing.assert_allclose(flat[MASK], np.broadcast_to(gold, flat[MASK].shape), atol=1e-6)
     half = edit(scene, MASK, albedo=gold, detail=0.5).materials.albedo[MASK & (groove < 1)]
     np.testing.assert_allclose(half[:, 0] ** 2, deep[:, 0], rtol=1e-4)
+
+
+def test_shades_that_the_network_left_in_its_albedo_stay_on_a_new_colour():
+    groove = grooves()
+    scene = shaded_scene(groove, predicted=True)
+    blue = (0.05, 0.1, 0.4)
+    new = edit(scene, MASK, albedo=blue).materials.albedo
+    assert ((new[MASK & (groove < 1)] / blue > 0.55) & (new[MASK & (groove < 1)] / blue < 0.7)).all()
+    # Metal has reflections, and no shades.
+    metal = edit(scene, MASK, albedo=blue, metallic=1).materials.albedo[MASK]
+    np.testing.assert_allclose(metal, np.broadcast_to(blue, metal.shape), atol=1e-6)
+    # What is of another hue is a pattern, and goes.
+    green = np.float32([0.05, 0.3, 0.1]) * 0.6
+    for maps in (scene.materials, scene.prior.materials):
+        maps.albedo[groove < 1] = green
+    flat = edit(scene, MASK, albedo=blue).materials.albedo[MASK]
+    np.testing.assert_allclose(flat, np.broadcast_to(blue, flat.shape), rtol=0.02)
 
 
 def glossy_scene(*, predicted: bool):
@@ -247,15 +278,11 @@ def test_white_paint_and_metal_take_the_whole_new_colour(predicted, values):
 def test_a_bright_colour_is_darkened_until_the_fine_shading_has_room():
     shading = np.ones(MASK.shape)
     shading[:, ::3] = 1.6
-    old = SCENE.prior.materials.albedo * 0.5
-    scene = replace(
-        SCENE,
-        materials=replace(SCENE.materials, albedo=(old * shading[..., None]).astype(np.float32)),
-    )
+    scene = shaded_scene(shading)
     new = edit(scene, MASK, albedo=(0.9, 0.45, 0.0)).materials.albedo
     light = new[MASK & (shading > 1)]
     dark = new[MASK & (shading == 1)]
-    # The floor of the ratio moves it by less than 1 %, since the old albedo varies.
+    # The floor of the ratio moves it by less than 1 %.
     np.testing.assert_allclose(light[:, 0], 1, rtol=0.01)
     assert 1.4 < light[0, 0] / dark[0, 0] <= 1.61
     np.testing.assert_allclose(new[MASK][:, 1], new[MASK][:, 0] / 2, rtol=1e-5)

@@ -16,6 +16,8 @@ DARK = 2e-3
 """Added to albedos whose chromaticity counts: black has none."""
 MIN_WHITE = 0.03
 """Less is none, twice as much is whole: the fit adds a little anywhere; tuned on nine made objects."""
+SAME_PAINT = 0.08
+"""Standard deviation of the chromaticity, a vector of unit length, of one paint."""
 WHITE_RIDGE = 0.03
 """Added to the square of white: of grey paint, which has the same direction, none is white; tuned by eye."""
 
@@ -59,20 +61,38 @@ def white_share(albedo: Array, paint: Array) -> Array:
 
 
 def shading_detail(
-    scene: Scene, region: Array, detail: float = 1.0, white: Array | float = 0.0
+    scene: Scene,
+    region: Array,
+    detail: float = 1.0,
+    metallic: Array | float = 0.0,
+    white: Array | float = 0.0,
 ) -> Array:
-    """[H, W] float32 factor of a new albedo: (fitted / predicted albedo)^detail, with a median of 1 in the region.
+    """[H, W] float32 factor of a new albedo: (fitted albedo / pattern)^detail, with a median of 1 in the region.
 
-    The network predicts the paint; the fit moves it until the rendering is the photo. What it adds is mostly shading
-    finer than the geometry, and is seen on any paint.
+    What the fit adds to the predicted albedo is mostly shading finer than the geometry, and is seen on any paint. The
+    network leaves shading in its albedo, too: what has the chromaticity of the region's paint is no pattern, unless the
+    new surface is metal, which has reflections in place of shades.
 
-    region: [H, W] bool, not empty. detail: in [0, 1]. white: [H, W] what of the fitted albedo is no paint.
+    region: [H, W] bool, not empty. detail: in [0, 1]. metallic: [H, W] of the new surface. white: [H, W] what of the
+    fitted albedo is no paint.
     """
     fitted = np.maximum(luminance(scene.materials.albedo) - white, 0)
-    predicted = luminance(scene.prior.materials.albedo)
-    ratio = np.log((fitted + FLOOR) / (predicted + FLOOR))
+    predicted = scene.prior.materials.albedo
+    pattern = np.log(luminance(predicted) + FLOOR)
+    shading = likeness(predicted, region) * (1 - metallic)
+    pattern = pattern + shading * (np.median(pattern[region]) - pattern)
+    ratio = np.log(fitted + FLOOR) - pattern
     ratio = detail * (ratio - np.median(ratio[region]))
     return np.clip(np.exp(ratio), *LIMITS).astype(np.float32)
+
+
+def likeness(albedo: Array, region: Array) -> Array:
+    """[H, W] in [0, 1]: how far an albedo [H, W, 3] has the median chromaticity of a region [H, W] bool."""
+    colour = albedo + DARK
+    chromaticity = colour / np.linalg.norm(colour, axis=-1, keepdims=True)
+    paint = np.median(chromaticity[region], axis=0)
+    apart = np.linalg.norm(chromaticity - paint, axis=-1) / SAME_PAINT
+    return np.exp(-0.5 * apart**2)
 
 
 def shaded(colour: Array, factor: Array, region: Array) -> Array:

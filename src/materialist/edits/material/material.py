@@ -52,9 +52,9 @@ def edit(
     prior = _predicted(scene, weight, colour, changes)
     if changes.albedo is not None or changes.texture is not None:
         region = core_of(weight)
-        # White gloss stays white; metal has a gloss of its own, and takes the old one as shading.
+        # Shades stay, and white gloss white; metal has reflections of its own.
         white = changes.detail * (1 - metallic) * highlights(scene, weight)
-        factor = shading_detail(scene, region, changes.detail, white)
+        factor = shading_detail(scene, region, changes.detail, metallic, white)
         colour = shaded(colour, factor, region)
         colour = colour + white[..., None] * (1 - colour)
     # Mixed by the weight, so that a feathered border fades.
