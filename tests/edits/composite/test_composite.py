@@ -111,8 +111,9 @@ def test_texture_beyond_the_fit_dims_with_the_surface():
     edited = np.where(MASK[..., None], 0.2, base).astype(np.float32)
     out = into_photo(photo, layers_of(base, edited, MASK))
     factor = (0.2 + SETTINGS.floor) / (0.5 + SETTINGS.floor)
+    inner = binary_erosion(MASK, iterations=2)  # at the border the photo's pixels are mixed
     np.testing.assert_allclose(
-        out[MASK], (0.2 + factor * 0.5 * (grain - 1))[MASK].repeat(3, -1), atol=0.02
+        out[inner], (0.2 + factor * 0.5 * (grain - 1))[inner].repeat(3, -1), atol=0.02
     )
     np.testing.assert_array_equal(out[~MASK][:100], photo.original[~MASK][:100])
 

@@ -1,5 +1,6 @@
 """The border of a mask at the photo's own size: where it runs, its mixed pixels, and the colours of both sides."""
 
+import cv2
 import numpy as np
 import pytest
 
@@ -18,6 +19,20 @@ def test_matte_finds_the_share_of_mixed_pixels():
     alpha = matte(mask, large)
     np.testing.assert_allclose(alpha[30], share, atol=0.06)
     assert (alpha[:, :20] == 1).all() and (alpha[:, 44:] == 0).all()
+
+
+@pytest.mark.parametrize("blur", [2.0, 8.0])
+@pytest.mark.parametrize("wall", [(0.1, 0.3, 0.6), (0.62, 0.33, 0.2)], ids=["other", "alike"])
+def test_a_border_out_of_focus_is_as_soft_as_the_photo(wall, blur):
+    step = np.float32(np.arange(160) < 84)[None].repeat(160, 0)
+    share = cv2.GaussianBlur(step, (0, 0), blur)
+    large = share[..., None] * np.float32((0.7, 0.3, 0.1)) + (1 - share[..., None]) * np.float32(
+        wall
+    )
+    mask = np.zeros((40, 40), bool)
+    mask[:, :21] = True
+    alpha = matte(mask, large)
+    assert np.abs(alpha - share).max() < 0.08
 
 
 def test_a_part_of_a_matte_is_that_of_the_whole():
@@ -84,7 +99,7 @@ def test_unmixed_colours_are_those_of_both_sides_and_give_the_picture():
     share = np.clip((30.5 - np.arange(60)) / 6 + 0.5, 0, 1)[None].repeat(40, 0).astype(np.float32)
     part = share[..., None]
     picture = (part * front + (1 - part) * back).astype(np.float32)
-    sides = unmixed(share, picture, 4.0)
+    sides = unmixed(share, picture, 3.0)
     np.testing.assert_allclose(part * sides[0] + (1 - part) * sides[1], picture, atol=1e-5)
     half = (share > 0.3) & (share < 0.7)
     for side, colour in zip(sides, (front, back), strict=True):

@@ -205,7 +205,9 @@ def test_shades_that_the_network_left_in_its_albedo_stay_on_a_new_colour():
     scene = shaded_scene(groove, predicted=True)
     blue = (0.05, 0.1, 0.4)
     new = edit(scene, MASK, albedo=blue).materials.albedo
-    assert ((new[MASK & (groove < 1)] / blue > 0.55) & (new[MASK & (groove < 1)] / blue < 0.7)).all()
+    assert (
+        (new[MASK & (groove < 1)] / blue > 0.55) & (new[MASK & (groove < 1)] / blue < 0.7)
+    ).all()
     # Metal has reflections, and no shades.
     metal = edit(scene, MASK, albedo=blue, metallic=1).materials.albedo[MASK]
     np.testing.assert_allclose(metal, np.broadcast_to(blue, metal.shape), atol=1e-6)

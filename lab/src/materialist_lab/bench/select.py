@@ -14,9 +14,9 @@ measure of its border against the outline, within 2 native pixels (outlines by e
 hue leaves so much of the old colour inside of the outline, and spills so much of the new one beyond it, within a 64th
 of the longer side, as shares of the colour inside. `border` rows:
 a rendered mesh that no network has learnt from, over photos of DATA, so that the share of each pixel is known, by the
-true mask at working size or by what a box finds; `SAD` (thousands of pixels) and `MSE` (in thousandths, over the
-pixels within 8 native ones of the border) are the matte's errors, `fringe` is the error of colours (of 255, RMS, there)
-when the mesh is painted anew.
+true mask at working size or by what a box finds, and by the true mask where the mesh is out of focus; `SAD` (thousands
+of pixels) and `MSE` (in thousandths, over the pixels within 8 native ones of the border) are the matte's errors,
+`fringe` is the error of colours (of 255, RMS, there) when the mesh is painted anew.
 """
 
 import contextlib
@@ -45,7 +45,12 @@ from materialist.predict.clicks.features import Box
 from materialist.types import Array, Scene
 from materialist_lab.bench.benchmark import COUNT, COUNT_OR_0, SIZE, Benchmark, Row
 from materialist_lab.bench.edits import scene_of, true_scene
-from materialist_lab.bench.real.borders import boundary_f, colour_errors, known_composites
+from materialist_lab.bench.real.borders import (
+    OUT_OF_FOCUS,
+    boundary_f,
+    colour_errors,
+    known_composites,
+)
 from materialist_lab.bench.report import Column, Report
 from materialist_lab.procedural.arrangements import arrangement
 from materialist_lab.procedural.synthetic import make_sample
@@ -153,7 +158,13 @@ class SelectBench(Benchmark):
     def _composed(self, data: Path, predictor: BundledPredictor) -> Iterator[Row]:
         """Rows of rendered meshes over photos: how well their mattes are found."""
         there = [name for name in outlines() if (data / "photos" / name).is_file()]
-        for known in known_composites(data, there[: self.composites], self.photo_size, self.seed):
+        names = there[: self.composites]
+        # --- Out of focus, by the true mask alone ---
+        for known in known_composites(data, names, self.photo_size, self.seed, OUT_OF_FOCUS):
+            row = {"method": "border, out of focus", "sample": known.name}
+            yield {**row, **known.errors(known.mask)}
+        # --- Sharp, by the true mask and as a box finds it ---
+        for known in known_composites(data, names, self.photo_size, self.seed):
             maps = predictor.predict(known.photo)
             scene = scene_of(known.photo, maps, np.ones((16, 32, 3), np.float32))
             box = boxes(known.mask, self.loose)["exact box"]

@@ -22,9 +22,10 @@ def test_a_mask_that_misses_the_thing_has_larger_errors():
     share[20:60, 20:60] = 1
     share[20:60, 60] = 0.5
     colour = np.full((80, 80, 3), (0.6, 0.1, 0.1), np.float32)
-    native = share[..., None] * colour + (1 - share[..., None]) * np.float32(0.4)
+    light = share[..., None] * colour
+    native = light + (1 - share[..., None]) * np.float32(0.4)
     linear = native.reshape(20, 4, 20, 4, 3).mean((1, 3))
-    known = KnownComposite("square", Photo(linear, Camera(20, 20, 40.0), native), share, colour)
+    known = KnownComposite("square", Photo(linear, Camera(20, 20, 40.0), native), share, light)
     good = known.errors(known.mask)
     bad = known.errors(np.roll(known.mask, 5, 1))
     assert good["border"] > 0.99 and good["sad"] < 0.2 and good["fringe"] < 8

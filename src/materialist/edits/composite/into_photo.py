@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from materialist.edits.composite.border import SETTINGS as BORDER
 from materialist.edits.composite.glare import add_glare
 from materialist.edits.composite.glow import light_share
 from materialist.edits.composite.layers import Layers
@@ -92,13 +93,13 @@ def _change(out: Array, photo: Photo, layers: Layers, tick: Progress) -> None:
         for side in (layers.changed, ~layers.changed)
     ]
     # Beyond its own pixels a change goes as far as the border may move.
-    reached = grown((stack[..., :3] != 0).any(-1), int(np.ceil(MATTE.reach + MATTE.width)))
+    reached = grown((stack[..., :3] != 0).any(-1), int(np.ceil(BORDER.reach + MATTE.widest)))
     if not reached.any():
         return
     box, columns = window(reached, native, 3)  # the reach of `GuidedUpsample`
     # --- Share and colours of the photo, with what the means of mixed pixels look up around them ---
     scale = max(1.0, native[1] / photo.linear.shape[1])
-    margin = int(np.ceil(4 * scale))
+    margin = int(np.ceil(3 * MATTE.unmix * scale))
     held = (_wider(box, margin, native[0]), _wider(columns, margin, native[1]))
     alpha = matte(layers.changed, photo.original, held)
     original = photo.original[held]
@@ -169,7 +170,7 @@ def _side_colours(alpha: Array, photo: Array, box: Box, scale: float) -> tuple[A
     if not mixed.size:
         return here, here
     # --- Only the columns with mixed pixels, and what their means look up ---
-    margin = int(np.ceil(4 * scale))
+    margin = int(np.ceil(3 * MATTE.unmix * scale))
     part = (rows, slice(columns.start + int(mixed[0]), columns.start + int(mixed[-1]) + 1))
     around = (_wider(rows, margin, len(photo)), _wider(part[1], margin, photo.shape[1]))
     # --- Both sides unmixed there; the photo itself elsewhere ---

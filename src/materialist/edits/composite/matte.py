@@ -1,15 +1,15 @@
 """The border of a marked surface at the photo's native size: where it runs, and what share and colour each side has."""
 
-import warnings
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from skimage.segmentation import random_walker
 
 from materialist.color import linear_to_srgb
+from materialist.edits.composite.border import SETTINGS as BORDER
+from materialist.edits.composite.border import on_edges
 from materialist.edits.composite.upsample import strips
-from materialist.geometry.silhouette import Box, area, common, disc, window, within
+from materialist.geometry.silhouette import Box, area, common, window, within
 from materialist.types import Array
 
 
@@ -19,13 +19,13 @@ class MatteSettings:
 
     tile: int = 48  # side of the parts in which a matte is made; derived: memory
 
-    # Where the border runs: a random walk shares out the pixels beside the mask's own border.
-    reach: float = 3.0  # by which the border may move
-    finest: float = 4.0  # grid points a working pixel, at most; derived: time
-    edge_weight: float = 5000.0  # of the photo's edges; larger keeps to them more
-
     # Shares of mixed pixels, by their place between the mean colours of both sides.
-    width: float = 1.5  # from the border up to which pixels may be mixed
+    width: float = 1.5  # from a sharp border up to which pixels may be mixed
+    widest: float = 5.0  # the same of a soft one
+    # standard deviations of the two Gaussians that say how soft the photo's edge is
+    narrow: float = 0.35
+    wide: float = 1.0
+    blur_grid: float = 2.0  # grid points a working pixel for that, at most; derived: time
     near: float = 2.5  # standard deviation of the windows of mean colours; larger averages texture
     # least standard deviation, pixels, of those windows on the grid where they are computed; derived: time
     coarse: float = 6.0
@@ -38,9 +38,13 @@ class MatteSettings:
     # continuation of that line beyond its ends, as the halos of sharpened edges need
     beyond: float = 0.75
 
+    # Colours of both sides of a mixed pixel: standard deviation of the Gaussian over which they are averaged.
+    unmix: float = 1.5
+
 
 SETTINGS = MatteSettings()
-RIM = 8
+SHIFT = 0.6
+RIM = 9
 """Pixels by which a mask is continued beyond the picture; derived: more than the distances that count."""
 STAIRS = 0.5
 """Standard deviation, pixels, of the Gaussian that takes steps out of a border that is enlarged; by eye."""
@@ -49,10 +53,10 @@ STAIRS = 0.5
 def matte(mask: Array, large: Array, box: Box | None = None) -> Array:
     """[H0, W0] float32 share of the masked surface in each native pixel, from a mask [H, W] bool at working size.
 
-    large: [H0, W0, 3] linear, the photo. The border moves to the photo's edges within `reach` of the mask's own, and
-    runs along that one where the photo has none. Beside it a pixel's place on the line between the mean colours of both
-    sides is its share; where both look alike, or the pixel is no mixture of them, the border decides. Exactly 0 and 1
-    further away. box: the native rows and columns to make, None for all.
+    large: [H0, W0, 3] linear, the photo. The border moves to the photo's edges (`border.on_edges`), and is as soft as
+    they are. Beside it a pixel's place on the line between the mean colours of both sides is its share; where both look
+    alike, or the pixel is no mixture of them, the border decides. Exactly 0 and 1 further away. box: the native rows
+    and columns to make, None for all.
     """
     # --- Away from the border: the mask itself, enlarged ---
     height, width = large.shape[:2]
@@ -63,9 +67,11 @@ def matte(mask: Array, large: Array, box: Box | None = None) -> Array:
     alpha: Array = np.asarray(hard[region]).astype(np.float32)
     if mask.all() or not mask.any():
         return alpha
+    reach = BORDER.reach + SETTINGS.widest + 1
+    distance = on_edges(distance, large, reach)
     # --- Tile by tile along the border, each with what its pixels look up around it ---
-    border = np.abs(distance) <= SETTINGS.reach + SETTINGS.width + 1
-    margin = int(np.ceil(3 * SETTINGS.near + SETTINGS.reach + SETTINGS.width))
+    border = np.abs(distance) <= SETTINGS.widest + 1
+    margin = int(np.ceil(3 * SETTINGS.near + SETTINGS.widest))
     for tile in strips(mask.shape[0], SETTINGS.tile):
         for part in strips(mask.shape[1], SETTINGS.tile):
             if not border[tile, part].any():
@@ -83,14 +89,15 @@ def matte(mask: Array, large: Array, box: Box | None = None) -> Array:
     return alpha
 
 
-def unmixed(share: Array, picture: Array, sigma: float) -> tuple[Array, Array]:
+def unmixed(share: Array, picture: Array, scale: float) -> tuple[Array, Array]:
     """Colours [h, w, 3] of the masked surface and of what is beside it, in a picture [h, w, 3] linear that mixes both.
 
-    share: [h, w] of the surface. sigma: pixels, of the Gaussian over which each side's colours are averaged. A pixel's
-    deviation from the mixture of both means is shared out, so that share * front + (1 - share) * back is the picture
-    (Forte 2021, "Approximate Fast Foreground Colour Estimation", with all of the residual).
+    share: [h, w] of the surface. scale: native pixels a working pixel. Each side's colours are averaged nearby; a
+    pixel's deviation from the mixture of both means is shared out, so that share * front + (1 - share) * back is the
+    picture (Forte 2021, "Approximate Fast Foreground Colour Estimation", with all of the residual).
     """
     part = share[..., None]
+    sigma = SETTINGS.unmix * max(1.0, scale)
     means = []
     for weight in (part, 1 - part):
         norm = _blurred(weight, sigma)
@@ -110,14 +117,51 @@ def _blurred(values: Array, sigma: float) -> Array:
 def _shares(distance: Array, large: Array, scale: float) -> Array:
     """[h0, w0] float32: `matte` of a window; `distance` [h, w] to the border, `scale` native pixels a working pixel."""
     encoded = linear_to_srgb(large)
-    away = _moved(distance, encoded, scale)  # working pixels, at native size
-    soft = np.clip(away + 0.5, 0, 1)
-    sure_in = away > SETTINGS.width
-    sure_out = away < -SETTINGS.width
-    # A hard border, softened by a pixel; the colours decide where they can.
+    size = large.shape[1::-1]
+    away = np.asarray(cv2.resize(distance, size, interpolation=cv2.INTER_CUBIC))
+    blur = _edge_blur(encoded, away, scale)
+    # A blurred step has 95 % of its rise within two standard deviations of its middle.
+    width = np.clip(2 * blur, SETTINGS.width, SETTINGS.widest)
+    sure_in = away > width
+    sure_out = away < -width
+    # A border as soft as the photo's edge, at least a pixel; the colours decide where they can, not far from it.
+    rise = np.maximum(2.5 * blur, 1)
+    least, soft, most = (np.clip(0.5 + (away + d) / rise, 0, 1) for d in (-SHIFT, 0, SHIFT))
     place, trust = _place(encoded, sure_in, sure_out, SETTINGS.near * scale)
-    alpha = soft + trust * (np.clip(place, 0, 1) - soft)
+    alpha = soft + trust * (np.clip(place, least, most) - soft)
     return np.where(sure_in, 1, np.where(sure_out, 0, alpha)).astype(np.float32)
+
+
+def _edge_blur(encoded: Array, away: Array, scale: float) -> Array:
+    """[h0, w0] standard deviation, working pixels, of the photo's blur across the border: of its lens, or out of focus.
+
+    A Gaussian of s makes of a step of blur b one of sqrt(b^2 + s^2); the energy of its gradient falls by the same
+    factor, which gives b from two Gaussians (after Zhuo and Sim 2011, "Defocus Map Estimation from a Single Image").
+    """
+    size = encoded.shape[1::-1]
+    fine = min(scale, SETTINGS.blur_grid)
+    grid = (max(2, round(size[0] * fine / scale)), max(2, round(size[1] * fine / scale)))
+    seen = cv2.resize(encoded, grid, interpolation=cv2.INTER_AREA)
+    distance = cv2.resize(away, grid, interpolation=cv2.INTER_AREA)
+    # --- The step: from the mean colour of one side to that of the other; texture counts little ---
+    most = SETTINGS.widest
+    near = SETTINGS.near * fine
+    place, trust = _place(seen, distance > most, distance < -most, near)
+    step = np.clip(place, -0.25, 1.25).astype(np.float32)
+    weight = trust * (np.abs(distance) < most)
+    # --- How much of the energy of its gradient each Gaussian leaves ---
+    energies = []
+    for sigma in (SETTINGS.narrow, SETTINGS.wide):
+        down, right = np.gradient(cv2.GaussianBlur(step, (0, 0), sigma * fine))
+        energy = ((down**2 + right**2) * weight).astype(np.float32)
+        energies.append(cv2.GaussianBlur(energy, (0, 0), near))
+    less, more = energies[1], energies[0]
+    square = (np.maximum(more, 1e-9) / np.maximum(less, 1e-9)) ** 2
+    variance = (SETTINGS.wide**2 - square * SETTINGS.narrow**2) / np.maximum(square - 1, 1e-4)
+    blur = np.sqrt(np.clip(variance, 0, (most / 2) ** 2))
+    # Without a step to measure, the border is sharp.
+    blur = np.where(less > 1e-6, blur, 0).astype(np.float32)
+    return np.asarray(cv2.resize(blur, size, interpolation=cv2.INTER_LINEAR))
 
 
 def _place(encoded: Array, sure_in: Array, sure_out: Array, sigma: float) -> tuple[Array, Array]:
@@ -138,47 +182,6 @@ def _place(encoded: Array, sure_in: Array, sure_out: Array, sigma: float) -> tup
     aside = np.sqrt(((encoded - back - nearest * line) ** 2).sum(-1))
     foreign = _ramp(np.maximum(aside - 2 * SETTINGS.grain, 0) / length, *SETTINGS.beside)
     return place, distinct * (1 - foreign) * known_front * known_back
-
-
-def _moved(distance: Array, encoded: Array, scale: float) -> Array:
-    """[h0, w0] signed distance to the border, working pixels, once it has moved to the photo's edges."""
-    size = encoded.shape[1::-1]
-    fine = min(scale, SETTINGS.finest)
-    grid = (max(2, round(size[0] * fine / scale)), max(2, round(size[1] * fine / scale)))
-    field = cv2.resize(distance.astype(np.float32), grid, interpolation=cv2.INTER_CUBIC)
-    seen = cv2.resize(encoded, grid, interpolation=cv2.INTER_AREA)
-    # --- Seeds: what is deep on either side; in a thin part its middle ---
-    box = disc(round(SETTINGS.reach * fine))
-    inside = field > 0.5 * cv2.dilate(field, box)
-    outside = -field > 0.5 * cv2.dilate(-field, box)
-    inside &= field > 0
-    outside &= field < 0
-    unsure = ~inside & ~outside
-    if not unsure.any() or not inside.any() or not outside.any():
-        return cv2.resize(field, size, interpolation=cv2.INTER_LINEAR)
-    labels = np.where(inside, 1, np.where(outside, 2, 0))
-    # Pixels that no unsure one touches are left out of the walk.
-    touched = cv2.dilate(unsure.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    with warnings.catch_warnings(action="ignore"):  # that other solvers are faster
-        likely = random_walker(
-            seen,
-            np.where(touched, labels, -1),
-            beta=SETTINGS.edge_weight,
-            mode="cg_j",
-            channel_axis=-1,
-            return_full_prob=True,
-        )[0]
-    members = np.where(touched, likely, inside) > 0.5
-    # --- Texture and rims have edges, too: the border moves where it parts two colours ---
-    _, trust = _place(seen, inside, outside, SETTINGS.near * fine)
-    trust = cv2.GaussianBlur(trust.astype(np.float32), (0, 0), max(fine / 4, 0.5))
-    moved = (
-        _signed_distance(members, STAIRS * (fine > 1)) / fine
-        if members.any() and not members.all()
-        else field
-    )
-    away = np.where(touched, field + trust * (moved - field), field)
-    return np.asarray(cv2.resize(away, size, interpolation=cv2.INTER_LINEAR))
 
 
 def _signed_distance(mask: Array, stairs: float) -> Array:

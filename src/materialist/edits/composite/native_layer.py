@@ -178,7 +178,7 @@ def _behind_things(
     depth = spread_known(_resized(whole, working, cv2.INTER_NEAREST))
     thing = (scene.depth > 0) & (scene.depth < depth - gap)
     before = matte(thing, scene.photo.original, there)
-    _, behind = unmixed(before, photo, max(1.0, native[1] / working[1]))
+    _, behind = unmixed(before, photo, native[1] / working[1])
     # Where nothing but the thing is seen, nothing is known of what it hides.
     mixed = near & (before > 0) & (before < 1)
     cut = np.where(near, alone.share * (1 - before), share)

@@ -9,7 +9,6 @@ from scipy import ndimage
 from skimage.morphology import remove_small_holes
 
 from materialist.color import linear_to_srgb
-from materialist.edits.select.rim import with_rim
 from materialist.errors import InputError
 from materialist.geometry.silhouette import disc, window
 from materialist.predict.bundled.edges import grabcut
@@ -59,8 +58,7 @@ def object_at_points(
     """
     if network:
         mask = tidy(_together(scene, points, extent), points)
-        whole = tidy(_whole(scene, mask, points), points)
-        return with_rim(whole, linear_to_srgb(scene.photo.linear))
+        return tidy(_whole(scene, mask, points), points)
     return tidy(grabcut(scene.photo.linear, _around(scene, points)), points)
 
 
@@ -72,8 +70,7 @@ def object_in(scene: Scene, box: Box, *, network: bool = True) -> Array:
     inside = np.zeros(scene.depth.shape, np.uint8)
     inside[box[1] : box[3], box[0] : box[2]] = 1
     if network:
-        mask = tidy(_outlined(scene, box) & (inside > 0), ())
-        return with_rim(mask, linear_to_srgb(scene.photo.linear)) & (inside > 0)
+        return tidy(_outlined(scene, box) & (inside > 0), ())
     return tidy(grabcut(scene.photo.linear, inside * np.uint8(cv2.GC_PR_FGD)), ())
 
 

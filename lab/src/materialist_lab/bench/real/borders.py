@@ -24,8 +24,10 @@ COLOURS = ((0.5, 0.06, 0.04), (0.7, 0.66, 0.58), (0.05, 0.12, 0.35), (0.2, 0.14,
 """Linear albedo of the things, in turn: some stand out, some are like wood and walls."""
 EXTENT = 0.45
 """Longest side of a thing, share of the photo's height."""
-LENS = 0.7
+SHARP = 0.7
 """Standard deviation of the blur of lens and sensor, native pixels."""
+OUT_OF_FOCUS = 4.0
+"""The same of a thing that is out of focus, as the foot of a pawn in a close-up."""
 NOISE = 0.01
 """Standard deviation of the sensor's noise, sRGB-encoded."""
 BORDER = 8
@@ -44,8 +46,8 @@ class KnownComposite:
     photo: Photo
     share: Array
     """[H0, W0] float32 in [0, 1]: of the thing in each native pixel."""
-    colour: Array
-    """[H0, W0, 3] float32 linear: the thing's colour where its share is above 0."""
+    light: Array
+    """[H0, W0, 3] float32 linear: what the thing adds to the photo, its share times its colour."""
 
     @property
     def mask(self) -> Array:
@@ -62,9 +64,9 @@ class KnownComposite:
         # --- The thing in another paint: its own colour times PAINT, the rest as it is ---
         paint = np.array(PAINT, np.float32) - 1
         scale = picture.shape[1] / mask.shape[1]
-        front, _ = unmixed(share, picture, max(1.0, scale))
+        front, _ = unmixed(share, picture, scale)
         painted = picture + share[..., None] * front * paint
-        truth = picture + self.share[..., None] * self.colour * paint
+        truth = picture + self.light * paint
         away = linear_to_srgb(np.maximum(painted, 0)) - linear_to_srgb(np.maximum(truth, 0))
         wrong = share - self.share
         return {
@@ -76,9 +78,12 @@ class KnownComposite:
 
 
 def known_composites(
-    data: Path, names: Sequence[str], size: int, seed: int
+    data: Path, names: Sequence[str], size: int, seed: int, blur: float = SHARP
 ) -> Iterator[KnownComposite]:
-    """A thing of DATA's meshes that no network has learnt from in each of these photos of DATA."""
+    """A thing of DATA's meshes that no network has learnt from in each of these photos of DATA.
+
+    blur: standard deviation, native pixels, of the Gaussian over the thing's border and colours.
+    """
     meshes = captures(data / "meshes", "**/*.ply", True)
     for k, name in enumerate(names):
         rng = np.random.default_rng([seed, k])
@@ -86,12 +91,13 @@ def known_composites(
         mesh = meshes[k % len(meshes)]
         share, colour = _rendered(mesh, photo, np.array(COLOURS[k % len(COLOURS)]), rng)
         # --- Over the photo, in linear light, through the lens and onto the sensor ---
-        covered = _blurred(share[..., None])
-        mixed = _blurred(share[..., None] * colour + (1 - share[..., None]) * photo.original)
+        covered = _blurred(share[..., None], blur)
+        light = _blurred(share[..., None] * colour, blur)
+        mixed = light + (1 - covered) * _blurred(photo.original, SHARP)
         native = _as_taken(mixed, rng)
         linear = cv2.resize(native, photo.linear.shape[1::-1], interpolation=cv2.INTER_AREA)
         shown = replace(photo, original=native, linear=np.asarray(linear), source=None)
-        yield KnownComposite(f"{mesh.stem} in {Path(name).stem}", shown, covered[..., 0], colour)
+        yield KnownComposite(f"{mesh.stem} in {Path(name).stem}", shown, covered[..., 0], light)
 
 
 def _rendered(
@@ -130,9 +136,9 @@ def _placed(body: Body, turn: Rotation, camera: Camera, aside: float) -> Body:
     return replace(body, vertices=vertices, normals=normals)
 
 
-def _blurred(picture: Array) -> Array:
-    """A native picture [H0, W0, C] through the lens."""
-    return np.asarray(cv2.GaussianBlur(picture, (0, 0), LENS)).reshape(picture.shape)
+def _blurred(picture: Array, sigma: float) -> Array:
+    """A native picture [H0, W0, C] under a Gaussian of `sigma` pixels."""
+    return np.asarray(cv2.GaussianBlur(picture, (0, 0), sigma)).reshape(picture.shape)
 
 
 def _as_taken(picture: Array, rng: np.random.Generator) -> Array:
