@@ -110,7 +110,7 @@ def test_switched_off_is_the_true_room_without_the_window():
     true, fit = rooms()
     lights = (emitting(_patch(true, LIGHT, "window"), (0.0,) * 3),)
     expected = picture(replace(true, bodies=lights), seed=5)
-    out = composite(fit, relight(fit, dim=0.0), spp=64)
+    out = composite(fit, relight(fit, dim=0.0), spp=128)
     away = ~LIGHT
     before = metrics.psnr(fit.photo.linear, expected, mask=away)
     assert metrics.psnr(out, expected, mask=away) > max(28, before + 3)

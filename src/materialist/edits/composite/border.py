@@ -27,9 +27,8 @@ class BorderSettings:
     # cost of a change of offset between two points, and of an offset: per square pixel, against a logarithm of variance
     bend: float = 50.0
     away: float = 0.2
-    smooth: float = (
-        1.5  # standard deviation, points, of the Gaussian that takes steps out of lines and offsets
-    )
+    # standard deviation, points, of the Gaussian that takes steps out of lines and offsets
+    smooth: float = 1.5
     # points of the border whose offsets a pixel takes, by inverse square distance
     neighbours: int = 4
 
