@@ -139,17 +139,15 @@ def _looked_up(picture: Array, places: Array) -> Array:
     """Bilinear values [N, ...] of a picture [h, w] or [h, w, 3] at places [N, ..., 2] (row, column)."""
     shape = places.shape[:-1]
     flat = places.reshape(-1, 2).astype(np.float32)
+    picture = np.ascontiguousarray(picture, np.float32)
     # OpenCV takes maps of at most 32,767 rows.
-    values = [
-        cv2.remap(
-            np.ascontiguousarray(picture, np.float32),
-            part[:, 1:],
-            part[:, :1],
-            cv2.INTER_LINEAR,
-            borderMode=cv2.BORDER_REPLICATE,
+    values = []
+    for part in np.array_split(flat, len(flat) // 30000 + 1):
+        rows = part[:, :1]
+        columns = part[:, 1:]
+        values.append(
+            cv2.remap(picture, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         )
-        for part in np.array_split(flat, len(flat) // 30000 + 1)
-    ]
     return np.concatenate(values).reshape(*shape, *picture.shape[2:])
 
 
@@ -175,8 +173,10 @@ def _offsets(seen: _Seen, points: Array, normal: Array, limit: Array, closed: bo
     outer = sums[:, -1:] - inner
     within = squares[:, -1:] - (inner**2).sum(-1) / cut - (outer**2).sum(-1) / (count - cut)
     offset = SETTINGS.step * np.arange(-most, most + 1)
-    cost = np.log(np.maximum(within, 0) / count + SETTINGS.grain**2) + SETTINGS.away * offset**2
-    cost += BEYOND * np.maximum(np.abs(offset) - limit[:, None], 0)
+    # --- The path of least cost ---
+    variance = np.maximum(within, 0) / count + SETTINGS.grain**2
+    too_far = np.maximum(np.abs(offset) - limit[:, None], 0)
+    cost = np.log(variance) + SETTINGS.away * offset**2 + BEYOND * too_far
     path = _least_path(cost, SETTINGS.bend * SETTINGS.step**2, closed)
     return offset[path]
 
@@ -191,20 +191,21 @@ def _least_path(cost: Array, bend: float, closed: bool) -> Array:
         cost = np.concatenate([np.roll(cost, -start, axis=0), cost[start : start + 1]])
         pinned = np.arange(columns) != cost[0].argmin()
         cost[[0, -1]] += np.where(pinned, 1e6, 0)
-    changes = np.arange(-3, 4)
-    padding = ((3, 3),)
+    # --- Forwards: the least cost of a path that ends in each column ---
+    changes = np.arange(-3, 4)[:, None]
+    penalty = bend * changes**2
+    came_from = np.arange(columns) + changes  # [7, K] column before, by the change
     best = cost[0]
-    came = np.zeros(cost.shape, int)
-    penalty = bend * changes[:, None] ** 2
-    window_of = np.arange(columns) + 3 + changes[:, None]
+    before = np.zeros(cost.shape, int)
     for row in range(1, len(cost)):
-        # [7, K] cost of each column by each change that leads to it.
-        ways = np.pad(best, padding, constant_values=np.inf)[window_of] + penalty
+        padded = np.pad(best, 3, constant_values=np.inf)
+        ways = padded[came_from + 3] + penalty
         change = ways.argmin(0)
-        came[row] = np.arange(columns) + changes[change]
+        before[row] = came_from[change, np.arange(columns)]
         best = ways[change, np.arange(columns)] + cost[row]
+    # --- Backwards along the best of them ---
     path = np.empty(len(cost), int)
     path[-1] = best.argmin()
     for row in range(len(cost) - 1, 0, -1):
-        path[row - 1] = came[row, path[row]]
+        path[row - 1] = before[row, path[row]]
     return np.roll(path[:count], start)
