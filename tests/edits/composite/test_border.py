@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from materialist.edits.composite.border import _least_path, _looked_up, on_edges
+from materialist.edits.composite.border import _least_path, on_edges
 from materialist.edits.composite.matte import _signed_distance
 
 INSIDE = (0.9, 0.4, 0.1)
@@ -85,15 +85,6 @@ def test_the_least_path_is_the_best_of_all_paths(closed, seed):
         start = int((cost.min(1) - cost.mean(1)).argmin())
         paths = (p for p in paths if p[start] == cost[start].argmin())
     assert total(path) == pytest.approx(min(map(total, paths)))
-
-
-def test_many_places_are_looked_up_in_parts():
-    rng = np.random.default_rng(1)
-    picture = rng.random((9, 7, 3)).astype(np.float32)
-    rows = rng.integers(0, 9, (700, 100))
-    columns = rng.integers(0, 7, (700, 100))
-    values = _looked_up(picture, np.stack([rows, columns], -1))
-    np.testing.assert_allclose(values, picture[rows, columns], atol=1e-6)
 
 
 def bar_photo(first, last, scale=4):

@@ -14,9 +14,9 @@ measure of its border against the outline, within 2 native pixels (outlines by e
 hue leaves so much of the old colour inside of the outline, and spills so much of the new one beyond it, within a 64th
 of the longer side, as shares of the colour inside. `border` rows:
 a rendered mesh that no network has learnt from, over photos of DATA, so that the share of each pixel is known, by the
-true mask at working size or by what a box finds, and by the true mask where the mesh is out of focus; `SAD` (thousands
-of pixels) and `MSE` (in thousandths, over the pixels within 8 native ones of the border) are the matte's errors,
-`fringe` is the error of colours (of 255, RMS, there) when the mesh is painted anew.
+true mask at working size, that mask a pixel too large or too small, or what a box finds, and by the true mask where the
+mesh is out of focus; `SAD` (thousands of pixels) and `MSE` (in thousandths, over the pixels within 8 native ones of the
+border) are the matte's errors, `fringe` is the error of colours (of 255, RMS, there) when the mesh is painted anew.
 """
 
 import contextlib
@@ -37,7 +37,7 @@ from materialist.edits.composite.matte import matte
 from materialist.edits.select.extents import next_region
 from materialist.edits.select.select import select
 from materialist.errors import InputError
-from materialist.geometry.silhouette import window
+from materialist.geometry.silhouette import grown, window
 from materialist.io.photo import read_photo
 from materialist.option_kinds import option
 from materialist.predict.bundled.predictor import BundledPredictor
@@ -163,13 +163,15 @@ class SelectBench(Benchmark):
         for known in known_composites(data, names, self.photo_size, self.seed, OUT_OF_FOCUS):
             row = {"method": "border, out of focus", "sample": known.name}
             yield {**row, **known.errors(known.mask)}
-        # --- Sharp, by the true mask and as a box finds it ---
+        # --- Sharp, by the true mask, by wrong ones, and as a box finds it ---
         for known in known_composites(data, names, self.photo_size, self.seed):
             maps = predictor.predict(known.photo)
             scene = scene_of(known.photo, maps, np.ones((16, 32, 3), np.float32))
             box = boxes(known.mask, self.loose)["exact box"]
             for prompt, mask in (
                 ("true mask", known.mask),
+                ("a pixel too large", grown(known.mask, 1)),
+                ("a pixel too small", ~grown(~known.mask, 1)),
                 ("exact box", _found(scene, known.mask, box=box)),
             ):
                 yield {"method": f"border, {prompt}", "sample": known.name, **known.errors(mask)}

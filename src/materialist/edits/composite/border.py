@@ -10,6 +10,7 @@ from skimage.measure import find_contours
 
 from materialist.color import linear_to_srgb
 from materialist.geometry.silhouette import Box, window
+from materialist.geometry.slopes import sampled
 from materialist.types import Array
 
 
@@ -136,19 +137,9 @@ def _resampled(line: Array) -> tuple[Array, bool]:
 
 
 def _looked_up(picture: Array, places: Array) -> Array:
-    """Bilinear values [N, ...] of a picture [h, w] or [h, w, 3] at places [N, ..., 2] (row, column)."""
-    shape = places.shape[:-1]
-    flat = places.reshape(-1, 2).astype(np.float32)
-    picture = np.ascontiguousarray(picture, np.float32)
-    # OpenCV takes maps of at most 32,767 rows.
-    values = []
-    for part in np.array_split(flat, len(flat) // 30000 + 1):
-        rows = part[:, :1]
-        columns = part[:, 1:]
-        values.append(
-            cv2.remap(picture, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
-        )
-    return np.concatenate(values).reshape(*shape, *picture.shape[2:])
+    """Bilinear values [..., C] of a picture [h, w] or [h, w, C] at places [..., 2] (row, column)."""
+    values = sampled(picture, places.reshape(-1, 2)[:, ::-1], order=1)
+    return values.reshape(*places.shape[:-1], *picture.shape[2:])
 
 
 def _offsets(seen: _Seen, points: Array, normal: Array, limit: Array, closed: bool) -> Array:

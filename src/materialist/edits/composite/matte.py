@@ -15,7 +15,7 @@ from materialist.types import Array
 
 @dataclass(frozen=True)
 class MatteSettings:
-    """Lengths in working pixels unless said otherwise; tuned by eye and on three composites."""
+    """Lengths in working pixels unless said otherwise; tuned by eye and on composites: three, ten for soft borders."""
 
     tile: int = 48  # side of the parts in which a matte is made; derived: memory
 
@@ -26,6 +26,7 @@ class MatteSettings:
     narrow: float = 0.35
     wide: float = 1.0
     blur_grid: float = 2.0  # grid points a working pixel for that, at most; derived: time
+    shift: float = 0.6  # by which a pixel's colour may move the border
     near: float = 2.5  # standard deviation of the windows of mean colours; larger averages texture
     # least standard deviation, pixels, of those windows on the grid where they are computed; derived: time
     coarse: float = 6.0
@@ -43,7 +44,6 @@ class MatteSettings:
 
 
 SETTINGS = MatteSettings()
-SHIFT = 0.6
 RIM = 9
 """Pixels by which a mask is continued beyond the picture; derived: more than the distances that count."""
 STAIRS = 0.5
@@ -126,7 +126,9 @@ def _shares(distance: Array, large: Array, scale: float) -> Array:
     sure_out = away < -width
     # A border as soft as the photo's edge, at least a pixel; the colours decide where they can, not far from it.
     rise = np.maximum(2.5 * blur, 1)
-    least, soft, most = (np.clip(0.5 + (away + d) / rise, 0, 1) for d in (-SHIFT, 0, SHIFT))
+    soft = np.clip(0.5 + away / rise, 0, 1)
+    least = np.clip(0.5 + (away - SETTINGS.shift) / rise, 0, 1)
+    most = np.clip(0.5 + (away + SETTINGS.shift) / rise, 0, 1)
     place, trust = _place(encoded, sure_in, sure_out, SETTINGS.near * scale)
     alpha = soft + trust * (np.clip(place, least, most) - soft)
     return np.where(sure_in, 1, np.where(sure_out, 0, alpha)).astype(np.float32)
@@ -155,7 +157,8 @@ def _edge_blur(encoded: Array, away: Array, scale: float) -> Array:
         down, right = np.gradient(cv2.GaussianBlur(step, (0, 0), sigma * fine))
         energy = ((down**2 + right**2) * weight).astype(np.float32)
         energies.append(cv2.GaussianBlur(energy, (0, 0), near))
-    less, more = energies[1], energies[0]
+    more, less = energies
+    # Energies are inverse to the widths: square = (b^2 + wide^2) / (b^2 + narrow^2).
     square = (np.maximum(more, 1e-9) / np.maximum(less, 1e-9)) ** 2
     variance = (SETTINGS.wide**2 - square * SETTINGS.narrow**2) / np.maximum(square - 1, 1e-4)
     blur = np.sqrt(np.clip(variance, 0, (most / 2) ** 2))
