@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 from made_catalog import make_archive, make_stock
 
 from materialist.camera import pixel_rays
@@ -127,6 +128,12 @@ def test_sculptures_are_fine_meshes_with_unit_normals(stock, make):
         solid = make(np.random.default_rng([2, k]), stock)
         assert np.isfinite(solid.vertices).all() and len(solid.faces) > 5000
         np.testing.assert_allclose(np.linalg.norm(solid.normals, axis=-1), 1, atol=1e-5)
+
+
+def test_a_sculpture_may_have_an_edge_of_three_faces():
+    vertices = [[0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, 0, 0]]
+    fan = trimesh.Trimesh(vertices, [[0, 1, 2], [0, 1, 3], [0, 1, 4]])
+    assert len(sculptures._subdivided(fan).faces) == 12
 
 
 def test_hard_lamps_are_small_and_stand_on_the_side_of_the_camera():

@@ -95,9 +95,17 @@ def _weathered(rng: np.random.Generator, stock: Stock) -> Solid:
     mesh = trimesh.Trimesh(rough.vertices, rough.faces)
     # Vertices enough to show weathering.
     while len(mesh.faces) < FACES:
-        mesh = mesh.subdivide_loop(1)
+        mesh = _subdivided(mesh)
     solid = _of(np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int32))
     return _displaced(rng, solid, _depth(rng, 0.003, 0.025))
+
+
+def _subdivided(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    """Four faces for each: rounded by Loop's rule, flat where parts touch (Loop's needs at most two faces an edge)."""
+    faces_per_edge = np.bincount(mesh.edges_unique_inverse)
+    if faces_per_edge.max() > 2:
+        return mesh.subdivide()
+    return mesh.subdivide_loop(1)
 
 
 def _of(vertices: Array, faces: Array) -> Solid:
