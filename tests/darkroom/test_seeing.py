@@ -2,11 +2,14 @@
 
 import io
 import json
+import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 from PIL import Image
 from studio_scenes import HEIGHT, WIDTH
 
+from materialist.darkroom import state
 from materialist.studio import views
 
 
@@ -60,6 +63,24 @@ def test_the_photo_with_all_its_pixels_and_a_colour_without_its_light(client):
     encoded = np.array([0.797, 0.381, 0.313]) * 255  # sRGB of 0.6, 0.12, 0.08
     assert np.abs(found - encoded).max() < 4
     assert client.post("/api/colour", json={"at": [-1, 2]}).status_code == 400
+
+
+def test_the_photo_with_all_its_pixels_is_encoded_once(client, monkeypatch):
+    """A large one takes a gigabyte of the server meanwhile."""
+    encode = state.srgb_levels
+    made = []
+
+    def slow(photo):
+        made.append(photo)
+        time.sleep(0.1)
+        return encode(photo)
+
+    monkeypatch.setattr(state, "srgb_levels", slow)
+    client.studio.page("b" * 32, "me").session.live.photos.clear()
+    with ThreadPoolExecutor(4) as threads:
+        answers = [*threads.map(client.get, ["/api/photo?full=1"] * 4)]
+    assert len({answer.content for answer in answers}) == 1
+    assert len(made) == 1
 
 
 def test_a_click_on_what_was_edited_opens_its_edit(client):

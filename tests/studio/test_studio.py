@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import pytest
 from made_tasks import until, wait
-from studio_scenes import zipped_package
+from studio_scenes import HEIGHT, WIDTH, package, zipped_package
 from studio_server import free_port
 
 from materialist.errors import InputError
@@ -248,6 +248,15 @@ def test_little_is_remembered_of_people_who_are_gone(shared, monkeypatch):
     for person in "abac":
         shared.note_sender(person, "1.2.3.4")
     assert [*shared.senders] == ["a", "c"]
+
+
+def test_the_memory_of_a_scene_counts_its_photo_twice(shared, tmp_path):
+    """Once in the studio, once in the process of the preview."""
+    project = shared.work.new("Room", "me", scene=package(tmp_path))
+    expected = SETTINGS.free_for_scene + (SETTINGS.free_a_pixel + 2 * 12) * WIDTH * HEIGHT
+    assert module._memory_of(project) == expected
+    (project.scene / "scene.json").write_text("[" * 100_000)
+    assert module._memory_of(project) == SETTINGS.free_for_scene
 
 
 def test_the_disk_of_the_photos_counts_too(shared, monkeypatch):

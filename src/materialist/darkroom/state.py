@@ -1,5 +1,6 @@
 """What a page of the darkroom shows, as one JSON object, and the outline of a region."""
 
+import threading
 from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,8 @@ SIZES = (256, 384, 512, 768, 1024)
 """Working sizes that the page offers, pixels of the longer side."""
 SHOWN_SIDE = 2048
 """Longest side of the photo as the page shows it, pixels."""
+_ENCODING = threading.Lock()
+"""Held while a photo is encoded at its own resolution, which takes up to a gigabyte."""
 
 
 def state(
@@ -199,9 +202,13 @@ def photo_jpeg(path: str, changed: float, longest: int) -> bytes:
 
 
 def native_jpeg(desk: Desk, longest: int = SHOWN_SIDE, quality: int = 93) -> bytes:
-    """The open photo at its own resolution, up to `longest` pixels a side, as a JPEG."""
-    photo = display.shrunk(desk.session.scene.photo.original, longest)
-    return display.encoded(srgb_levels(photo), "JPEG", quality=quality)
+    """The open photo at its own resolution, up to `longest` pixels a side, as a JPEG: made once."""
+    live = desk.session.preview
+    with _ENCODING:
+        if longest not in live.photos:
+            photo = display.shrunk(live.scene.photo.original, longest)
+            live.photos[longest] = display.encoded(srgb_levels(photo), "JPEG", quality=quality)
+        return live.photos[longest]
 
 
 def working_jpeg(desk: Desk) -> bytes:

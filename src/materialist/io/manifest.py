@@ -43,7 +43,7 @@ def check_files(folder: Path, original: str, bodies: int, most: float) -> None:
     total = sum(_exr_bytes(inside(folder, name)) for name in pictures)
     total += sum(inside(folder, name).stat().st_size for name in meshes)
     _check_size(label := inside(folder, "plane_label.png"), image_size(label))
-    total += _photo_bytes(inside(folder, original)) + decoded_bytes(label)
+    total += photo_bytes(inside(folder, original)) + decoded_bytes(label)
     if total > most:
         raise SceneError(
             f"The scene {folder} takes {total / 1e9:.1f} GB of memory, more than {most / 1e9:g} GB; "
@@ -69,7 +69,7 @@ def _exr_bytes(file: Path) -> int:
     return exr_bytes(file)
 
 
-def _photo_bytes(file: Path) -> int:
+def photo_bytes(file: Path) -> int:
     """Bytes of a photo once decoded."""
     return (
         RAW_BYTES_RATIO * file.stat().st_size

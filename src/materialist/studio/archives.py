@@ -117,11 +117,18 @@ def extract_scene(report: Any, file: Path, target: Path) -> None:
         # Anything else in the zip stays packed.
         known = {name: info for name, info in members.items() if _MEMBER.fullmatch(name)}
         _extract(archive, known, target, shown)
-    camera = load_scene(target, most=SETTINGS.decoded_bytes).camera
+    scene = load_scene(target, most=SETTINGS.decoded_bytes)
+    camera = scene.camera
     if camera.width * camera.height > SETTINGS.scene_pixels:
         raise InputError(
             f"{shown} is a scene of {camera.width} x {camera.height} pixels; the studio takes up to "
             f"{SETTINGS.scene_pixels / 1e6:g} megapixels. Invert its photo again at a smaller --size."
+        )
+    height, width = scene.photo.original.shape[:2]
+    if width * height > SETTINGS.upload_pixels:
+        raise InputError(
+            f"{shown} holds a photo of {width} x {height} pixels; the studio takes up to "
+            f"{SETTINGS.upload_pixels / 1e6:g} megapixels. Shrink the photo, and invert it again."
         )
     # `load_scene` does not read it, but the server does, for the list of photos.
     shown_photo = target / "photo.png"

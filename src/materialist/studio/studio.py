@@ -18,6 +18,7 @@ import psutil
 
 from materialist.errors import InputError, MaterialistError, OutputError
 from materialist.io.atomic import writing
+from materialist.io.manifest import photo_bytes
 from materialist.jobs.process import Worker
 from materialist.jobs.queue import Job, JobQueue
 from materialist.jobs.worker import DONE
@@ -433,8 +434,11 @@ def _check_memory(project: Project) -> None:
 
 
 def _memory_of(project: Project) -> float:
-    """Bytes of memory that opening a project takes, by the size of its scene."""
-    with suppress(OSError, ValueError, KeyError, TypeError):
-        width, height = json.loads((project.scene / "scene.json").read_text("utf-8"))["size"]
-        return SETTINGS.free_for_scene + SETTINGS.free_a_pixel * int(width) * int(height)
+    """Bytes of memory that opening a project takes, by the sizes of its scene and its photo."""
+    with suppress(Exception):  # `load_scene` tells what is wrong with a damaged package
+        meta = json.loads((project.scene / "scene.json").read_text("utf-8"))
+        pixels = int(meta["camera"]["width"]) * int(meta["camera"]["height"])
+        photo = photo_bytes(project.scene / Path(meta["photo"]["original"]).name)
+        # Both the studio and the preview decode the photo.
+        return SETTINGS.free_for_scene + SETTINGS.free_a_pixel * pixels + 2 * photo
     return SETTINGS.free_for_scene

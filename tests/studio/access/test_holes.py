@@ -202,3 +202,10 @@ def test_a_large_scene_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(archives, "SETTINGS", StudioSettings(scene_pixels=100))
     with pytest.raises(InputError, match="Invert its photo again"):
         archives.extract_scene(None, zipped_package(tmp_path), tmp_path / "target")
+
+
+def test_a_scene_of_a_large_photo_is_refused(tmp_path, monkeypatch):
+    """The server itself decodes it."""
+    monkeypatch.setattr(archives, "SETTINGS", StudioSettings(upload_pixels=3000))
+    with pytest.raises(InputError, match="a photo of 64 x 48 pixels.*up to 0.003 megapixels"):
+        archives.extract_scene(None, zipped_package(tmp_path), tmp_path / "target")
