@@ -258,7 +258,23 @@ def test_pages_and_changes_of_one_address_are_limited(visit, shared):
         assert browser.get("/api/state", headers={"x-materialist-page": f"{number:032x}"})
     answer = browser.get("/api/state", headers={"x-materialist-page": "f" * 32})
     assert "close some" in answer.json()["error"]
+    # Refused before a byte of its body was read.
+    body = (pytest.fail("read") for _ in range(1))
+    headers = {"x-materialist-page": "f" * 32}
+    answer = browser.post("/api/deselect", content=body, headers=headers)
+    assert "close some" in answer.json()["error"]
     assert visit("e" * 32, "9.9.9.9").get("/api/state").status_code == 200
+
+
+def test_a_change_is_counted_while_its_body_comes(visit, shared):
+    counts = []
+
+    def body():
+        counts.append(shared.quota._running["request", "1.2.3.4"])
+        yield b"{}"
+
+    assert visit().post("/api/deselect", content=body()).status_code == 200
+    assert counts == [1] and not shared.quota._running
 
 
 def test_answers_name_no_folder_of_this_machine(visit, shared):

@@ -2,6 +2,7 @@
 
 import traceback
 from collections.abc import Awaitable, Callable
+from contextlib import AbstractContextManager
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
@@ -35,12 +36,15 @@ def posted(desks: Desks, kind: type[Kind], change: Callable[[Desk, Kind], Any]) 
     """An endpoint that reads a body and answers with what change(desk, body) returns, as JSON."""
 
     async def answer(request: Request) -> Response:
-        raw = await request.body()
+        with _counted(desks, request):
+            # The page first: what is refused takes no memory for its body.
+            await run_in_threadpool(_at_desk, desks, request, lambda desk: None)
+            raw = await request.body()
 
-        def changed(desk: Desk) -> Any:
-            return change(desk, kind.model_validate_json(raw or b"{}"))
+            def changed(desk: Desk) -> Any:
+                return change(desk, kind.model_validate_json(raw or b"{}"))
 
-        return JSONResponse(await run_in_threadpool(_at_desk, desks, request, changed))
+            return JSONResponse(await run_in_threadpool(_at_desk, desks, request, changed))
 
     return guarded(desks.studio, answer)
 
@@ -52,16 +56,22 @@ def got(desks: Desks, make: Callable[[Desk, Request], Response]) -> Answerer:
         def made(desk: Desk) -> Response:
             return make(desk, request)
 
-        return await run_in_threadpool(_at_desk, desks, request, made)
+        with _counted(desks, request):
+            return await run_in_threadpool(_at_desk, desks, request, made)
 
     return guarded(desks.studio, answer)
+
+
+def _counted(desks: Desks, request: Request) -> AbstractContextManager[None]:
+    """A place among the requests of a sender, who must not keep all threads busy. Raises InputError for none."""
+    studio = desks.studio
+    return studio.quota.request(studio.sender(person_of(studio, request)))
 
 
 def _at_desk(desks: Desks, request: Request, work: Callable[[Desk], Any]) -> Any:
     """What work(desk) gives at the desk of the page that asks."""
     desk = desk_of(desks, request)
-    # Counted: one page must not keep all threads busy.
-    with desk.session.allowance.request(), desk.page.at_work():
+    with desk.page.at_work():
         return work(desk)
 
 

@@ -20,6 +20,15 @@ from materialist.studio.server import password_of
 ALONE = "127.0.0.1"
 
 
+def reader():
+    """An application that reads the body of whatever is posted."""
+
+    async def read(request):
+        return PlainTextResponse(str(len(await request.body())))
+
+    return Starlette(routes=[Route("/{path:path}", read, methods=["POST"])])
+
+
 async def echo(scope, receive, send):
     """Says what it heard of proxies, and allows everything to everyone."""
     heard = [f"{k.decode()}={v.decode()}" for k, v in scope["headers"] if b"forwarded" in k]
@@ -197,13 +206,8 @@ def test_bodies_are_counted_and_not_believed(shared, monkeypatch):
     monkeypatch.setattr(
         gate, "SETTINGS", StudioSettings(request_bytes=1000, upload_megabytes=0.001)
     )
-
-    async def read(request):
-        return PlainTextResponse(str(len(await request.body())))
-
-    reader = Starlette(routes=[Route("/{path:path}", read, methods=["POST"])])
     page, closed = (
-        TestClient(Gate(reader, shared, password=word), headers={gate.PAGE_HEADER: "a"})
+        TestClient(Gate(reader(), shared, password=word), headers={gate.PAGE_HEADER: "a"})
         for word in (None, "open sesame")
     )
 
@@ -214,3 +218,26 @@ def test_bodies_are_counted_and_not_believed(shared, monkeypatch):
         assert page.post(f"/api/{place}", content=chunks(most)).status_code == 200
         assert page.post(f"/api/{place}", content=chunks(most + 1)).status_code == 413
     assert closed.post("/login", content=chunks(50)).status_code == 413
+
+
+@pytest.mark.parametrize(("path", "password"), [("/api/set", None), ("/login", "open sesame")])
+def test_a_body_that_does_not_end_is_waited_for_a_while(shared, monkeypatch, path, password):
+    monkeypatch.setattr(gate, "SETTINGS", StudioSettings(request_seconds=0.05))
+    door = Gate(reader(), shared, password=password)
+    scope = {"type": "http", "method": "POST", "path": path, "query_string": b""}
+    scope["headers"] = [*headers(host="studio.example", x_materialist_page="a").items()]
+    sent = []
+
+    async def receive():
+        await asyncio.sleep(0.01)
+        return {"type": "http.request", "body": b"x", "more_body": True}
+
+    async def send(message):
+        sent.append(message)
+
+    async def ask():
+        await asyncio.wait_for(door(scope, receive, send), 5)
+
+    with ThreadPoolExecutor(1) as thread:
+        thread.submit(asyncio.run, ask()).result()
+    assert sent[0]["status"] == 408

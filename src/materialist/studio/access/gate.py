@@ -1,5 +1,6 @@
 """The gate of the studio: which requests reach the page, whose they are, and what a browser may do with the answers."""
 
+import asyncio
 import base64
 import hashlib
 import hmac
@@ -99,13 +100,15 @@ class Gate:
             if self._admits_socket(scope):
                 return await self.app(scope, receive, send)
             return await send({"type": "websocket.close", "code": 1008})
-        # --- Headers that count, and as many bytes as the place may take ---
+        # --- Headers that count, and as many bytes as the place may take, in time ---
         address = self._address(scope)
         scope["headers"] = self._heard(scope["headers"])
         max_bytes = _FORM_BYTES if scope["path"] == "/login" else SETTINGS.request_bytes
+        seconds: float | None = SETTINGS.request_seconds
         if scope["path"] == UPLOAD:
             max_bytes = largest_upload()
-        request = Request(scope, _limited(receive, max_bytes))
+            seconds = None  # it has a limit for each of its parts
+        request = Request(scope, _limited(receive, max_bytes, seconds))
         # --- Who answers: the page, the form for passwords, or a refusal ---
         cookies: dict[str, str] = {}
         app = await self._answer(request, cookies, address)
@@ -236,8 +239,8 @@ class Gate:
         """
         try:
             body = await request.body()
-        except HTTPException:
-            return self._form(413, "That is too long for a password.")
+        except HTTPException as error:
+            return self._form(error.status_code, "That is too long, or too slow, for a password.")
         now = time.monotonic()
         wrong = self._wrong_from(sender_of(address), now)
         if len(wrong) >= SETTINGS.wrong_passwords:
@@ -282,16 +285,24 @@ def promised_size(request: Request) -> int:
     return int(size)
 
 
-def _limited(receive: Any, max_bytes: int) -> Any:
-    """`receive` that raises an HTTPException, after so many bytes, promised or not."""
+def _limited(receive: Any, max_bytes: int, seconds: float | None) -> Any:
+    """`receive` that raises an HTTPException for a body of more bytes, promised or not, or of more seconds."""
     got = 0
+    end = None if seconds is None else asyncio.get_running_loop().time() + seconds
 
     async def counted() -> Any:
-        nonlocal got
-        message = await receive()
+        nonlocal got, end
+        try:
+            async with asyncio.timeout_at(end):
+                message = await receive()
+        except TimeoutError as error:
+            words = f"The request did not arrive within {seconds:g} seconds; send it again."
+            raise HTTPException(408, words) from error
         got += len(message.get("body", b""))
         if got > max_bytes:
             raise HTTPException(413, f"More than {max_bytes / 1e6:g} MB is not taken here.")
+        if not message.get("more_body", False):
+            end = None  # what follows is the end of the connection
         return message
 
     return counted

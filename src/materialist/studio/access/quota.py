@@ -165,15 +165,6 @@ class Allowance:
         with self._quota.opening(self._sender()):
             yield
 
-    @contextmanager
-    def request(self) -> Iterator[None]:
-        """As `Quota.request`."""
-        if self._quota is None:
-            yield
-            return
-        with self._quota.request(self._sender()):
-            yield
-
 
 def sender_of(address: str) -> str:
     """The name under which an IP address is counted: itself, and of IPv6 its network of 64 bits, which one has.
