@@ -1,5 +1,6 @@
 """What is taken away, and lists of edits with their files loaded on the same photo or another."""
 
+import threading
 import zipfile
 
 import numpy as np
@@ -134,6 +135,7 @@ LIST = "- edit: {mask: m.png, hue: 3}"
         ({"edits.yaml": LIST, "m.png": "x" * 3_000_000}, "takes up to 2 MB"),
         ({"edits.yaml": "- drop: {mesh: [a.exe], at: [1, 2]}", "a.exe": "MZ"}, "not a mesh"),
         ({"edits.yaml": "- explode: {}"}, "must be one of"),
+        ({"edits.yaml": LIST + " " * 1_000_000}, "edits.yaml in a.zip is larger than 1 MB"),
     ],
 )
 def test_lists_and_zips_that_are_refused_leave_nothing(
@@ -152,6 +154,24 @@ def test_lists_and_zips_that_are_refused_leave_nothing(
         str(tmp_path) not in studio.without_folders(str(error.value)) and session.edits.steps == ()
     )
     assert sorted(session.workspace.iterdir()) == before
+
+
+def test_other_requests_go_on_while_a_list_is_opened(session, tmp_path, monkeypatch):
+    opened_upload = uploads.opened_upload
+    selected = []
+
+    def opened(*given, **arguments):
+        other = threading.Thread(target=session.deselect, daemon=True)
+        other.start()
+        other.join(5)
+        selected.append(not other.is_alive())
+        return opened_upload(*given, **arguments)
+
+    monkeypatch.setattr(uploads, "opened_upload", opened)
+    (tmp_path / "edits.yaml").write_text("- relight: {rotate: 45}\n")
+    session.read_edits(tmp_path / "edits.yaml")
+    session.read_edits(zipped(tmp_path / "a.zip", {"edits.yaml": "- relight: {rotate: 4}\n"}))
+    assert selected == [True, True] and session.edits.steps[0].options == {"rotate": "4"}
 
 
 def test_only_what_the_list_names_is_unpacked_from_a_folder_in_the_zip(tmp_path):

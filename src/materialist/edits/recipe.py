@@ -15,6 +15,9 @@ from materialist.io.text import read_text
 from materialist.option_kinds import OFF, ON, beside, declarations, parse_numbers, several
 from materialist.types import Array, Scene
 
+MAX_BYTES = 1_000_000
+"""Of a list of edits: an ordinary one has a few thousand."""
+
 
 @dataclass(frozen=True)
 class Step:
@@ -46,7 +49,7 @@ def read_recipe(path: str | Path) -> list[Step]:
 
     path = Path(path)
     try:
-        if path.stat().st_size > 1_000_000:
+        if path.stat().st_size > MAX_BYTES:
             raise InputError(f"{path} is larger than 1 MB; a list of edits is a short text.")
         content = yaml.load(read_text(path), Loader=_loader())
     except UnicodeDecodeError as error:

@@ -13,7 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from materialist.edits.recipe import Step, read_recipe
+from materialist.edits.recipe import MAX_BYTES, Step, read_recipe
 from materialist.errors import InputError
 from materialist.io.atomic import SCENE_FILES
 from materialist.io.decode import image_size
@@ -91,6 +91,8 @@ def extract_list(report: Any, file: Path, folder: Path) -> tuple[list[Step], dic
     advice = "give the zip that 'edits.yaml with its masks' makes"
     with _members(file, shown, r"edits\.ya?ml", f"no edits.yaml; {advice}") as (archive, members):
         name = "edits.yaml" if "edits.yaml" in members else "edits.yml"
+        if members[name].file_size > MAX_BYTES:
+            raise InputError(f"The {name} in {shown} is larger than 1 MB; shorten it.")
         _extract(archive, {name: members[name]}, folder, shown)
         steps = read_recipe(folder / name)
         options = _named(steps)

@@ -334,14 +334,13 @@ class Session:
 
         Raises InputError, and changes nothing then.
         """
+        # Opened before the lock: a large file takes seconds, and other requests go on meanwhile.
+        workspace = self.workspace
+        if file.suffix.lower() == ".zip":
+            steps = unpack(workspace, file, self.allowance)
+        else:
+            steps = located(workspace, uploads.opened_upload(read_list, file, self.allowance))
         with self.lock:
-            _ = self.scene
-            if file.suffix.lower() == ".zip":
-                steps = unpack(self.workspace, file, self.allowance)
-            else:
-                steps = located(
-                    self.workspace, uploads.opened_upload(read_list, file, self.allowance)
-                )
             self.change("load", EditList(steps))
 
     def change(self, action: str, after: EditList, *, moving: bool = False) -> None:

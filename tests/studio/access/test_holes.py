@@ -169,6 +169,12 @@ def test_pages_and_changes_of_one_address_are_limited(shared):
     assert not shared.quota._running
 
 
+def test_those_who_wait_for_a_file_to_be_opened_leave_threads_to_others():
+    """All requests of a sender may wait for one edit in which a thing falls."""
+    threads_of_the_server = 40
+    assert SETTINGS.openings * SETTINGS.requests < threads_of_the_server
+
+
 def test_a_large_texture_is_shrunk_before_the_server_reads_it(tmp_path, monkeypatch):
     monkeypatch.setattr(uploads, "SETTINGS", StudioSettings(edit_pixels=1000))
     rng = np.random.default_rng(0)
