@@ -201,6 +201,7 @@ def test_the_list_is_switched_ordered_and_shortened(client):
         ("set", {"kind": "edit", "options": {"hue": "x"}}, "hue"),
         ("set", {"kind": "edit", "options": {"roughness": 2}}, "must lie in"),
         ("set", {"kind": "edit", "options": {"nothing": 2}}, "cannot be set"),
+        ("set", {"kind": "edit", "options": {"hue": [1] * 17}}, "options.hue"),
         ("set", {"kind": "edit", "options": {"hue": {}}}, "options.hue"),
         ("set", {"kind": "edit", "options": {"hue": 1}, "more": 1}, "more"),
         ("set", {"kind": "sudo", "options": {}}, "kind"),

@@ -54,6 +54,8 @@ def test_a_slider_without_a_number_writes_nothing(session):
     session.act("choose", 0)
     with pytest.raises(InputError, match="no finite number"):
         place_lamp(session, 25, 24, float("inf"))
+    with pytest.raises(InputError, match="hue"):
+        session.set("edit", hue="nan")
     assert "nan" not in (session.workspace / "edits.yaml").read_text() and not session.next_object
 
 

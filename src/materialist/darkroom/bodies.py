@@ -8,7 +8,8 @@ Number = Annotated[float, Field(allow_inf_nan=False, ge=-1e6, le=1e6)]
 Name = Annotated[str, Field(max_length=100)]
 Place = tuple[Number, Number]
 """(x, y) in working pixels."""
-Value = bool | Number | Annotated[str, Field(max_length=60)] | list[Number] | None
+Numbers = Annotated[list[Number], Field(max_length=16)]
+Value = bool | Number | Annotated[str, Field(max_length=60)] | Numbers | None
 """Of an option; None clears it."""
 
 

@@ -29,7 +29,7 @@ class StudioSettings:
     message_bytes: int = 4096  # largest message of a page; none is expected
     connections: int = 200  # of one address
     request_seconds: float = 30.0  # in which a new connection must have sent a request
-    requests: int = 12  # of one sender at a time: `openings` senders leave some of the server's 40 threads
+    requests: int = 12  # of one sender at a time; `openings` senders leave some of 40 threads
     # What is read of it.
     edit_pixels: int = 8_000_000  # largest picture of an edit, to which a larger one is shrunk
     mesh_faces: int = 200_000  # of an object's mesh

@@ -9,7 +9,7 @@ from typing import Any
 
 from materialist.edits.core.operation import REGION, Target
 from materialist.edits.light.operation import RELIGHT
-from materialist.edits.recipe import Step, write_recipe
+from materialist.edits.recipe import Step, options_of, write_recipe
 from materialist.errors import InputError, OutputError
 from materialist.jobs.process import Worker
 from materialist.jobs.queue import Job, JobQueue
@@ -280,6 +280,7 @@ class Session:
         step = edits.current_step
         assert index is not None and step is not None
         new = with_options(step, **options)
+        options_of(new)  # of a step that is switched off, too, which `change` does not apply
         # A light without options would be a step that does nothing.
         empty = new.operation.target is Target.LIGHT and not {*new.options} - {"skip"}
         # --- One entry of the history while the same values slide on ---

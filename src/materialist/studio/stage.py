@@ -1,5 +1,6 @@
 """What a page shows: the picture with its label, maps, a report, the list of edits, and jobs in words."""
 
+from math import isfinite
 from shlex import quote
 from time import time
 from typing import Any
@@ -126,9 +127,11 @@ def _lamps(edits: EditList) -> list[list[float]]:
     place = edits.light
     lamps = edits.steps[place].options.get("lamps", []) if place is not None else []
     try:
-        return [[float(v) for v in lamp[:2]] for lamp in lamps if isinstance(lamp, list)]
+        places = [[float(v) for v in lamp[:2]] for lamp in lamps if isinstance(lamp, list)]
     except (TypeError, ValueError):
         return []
+    # JSON has no NaN.
+    return [marked for marked in places if all(map(isfinite, marked))]
 
 
 def _badge(steps: tuple[Step, ...], client: glass.GlassClient | None, waiting: bool) -> str:
