@@ -9,8 +9,8 @@ from PIL import Image
 from materialist.edits import recipe
 from materialist.edits.light.relight import lamp, relight
 from materialist.edits.material.material import edit
-from materialist.edits.recipe import apply, read_recipe
-from materialist.errors import InputError
+from materialist.edits.recipe import Step, apply, read_recipe, write_recipe
+from materialist.errors import InputError, OutputError
 from materialist.io.exr import write_exr
 
 pytestmark = pytest.mark.usefixtures("filled_smoothly")
@@ -143,3 +143,11 @@ def test_a_region_is_chosen_on_the_steps_device(monkeypatch):
         SCENE, [recipe.Step("edit", {"click": [16, 18], "with": "sam2", "hue": 10})], device="cpu"
     )
     assert seen == ["cpu"]
+
+
+def test_a_list_that_could_not_be_read_again_is_not_written(folder):
+    long, longer = (Step("edit", {"albedo": "x" * count}) for count in (900_000, 1_100_000))
+    write_recipe(folder / "edits.yaml", [long])
+    with pytest.raises(OutputError, match=r"edits\.yaml would have 1\.1 MB"):
+        write_recipe(folder / "edits.yaml", [longer])
+    assert read_recipe(folder / "edits.yaml")[0].options == long.options

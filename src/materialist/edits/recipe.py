@@ -9,7 +9,7 @@ from typing import Any
 from materialist.edits.core.operation import PLACE, Operation, Placement, Target
 from materialist.edits.registry import OPERATIONS
 from materialist.edits.select.select import select
-from materialist.errors import InputError
+from materialist.errors import InputError, OutputError
 from materialist.io.atomic import write_whole
 from materialist.io.text import read_text
 from materialist.option_kinds import OFF, ON, beside, declarations, parse_numbers, several
@@ -148,7 +148,10 @@ def with_files(step: Step, use: Callable[[str, Any], Any]) -> Step:
 
 
 def write_recipe(path: str | Path, steps: list[Step]) -> None:
-    """Write steps as a YAML file that `read_recipe` gives back. Raises OutputError when it cannot be written."""
+    """Write steps as a YAML file that `read_recipe` gives back.
+
+    Raises OutputError when it cannot be written, or would be larger than `read_recipe` takes.
+    """
     import yaml
 
     # All values are texts on reading, so that none of them needs quotes.
@@ -169,7 +172,11 @@ def write_recipe(path: str | Path, steps: list[Step]) -> None:
         sort_keys=False,
         width=200,
         allow_unicode=True,
-    )
+    ).encode()
+    if len(text) > MAX_BYTES:
+        raise OutputError(
+            f"{path} would have {len(text) / 1e6:.2g} MB; a list of edits may have 1 MB: take some away first."
+        )
     write_whole(path, text)
 
 
