@@ -266,6 +266,28 @@ def test_pages_and_changes_of_one_address_are_limited(visit, shared):
     assert visit("e" * 32, "9.9.9.9").get("/api/state").status_code == 200
 
 
+def test_a_photo_that_cannot_be_shown_does_not_lock_its_owner_out(visit, shared, monkeypatch):
+    browser = visit(arrive=False)
+    browser.get("/")
+    person = shared.person(browser.cookies["materialist_person"])
+    mine = shared.work.new("Mine", person, scene=shared.start.scene)
+    shared.note_last(person, mine.name)
+
+    def broken(scene):
+        raise TypeError("three is not four")
+
+    monkeypatch.setattr("materialist.darkroom.state.is_traced", broken)
+    answer = browser.get("/api/arrive")
+    assert answer.status_code == 200 and "TypeError" in answer.json()["notes"][0]
+    assert answer.json()["project"] is None and person not in shared.last
+    # A damaged one stays the last: its sentence says what to do.
+    monkeypatch.undo()
+    shared.note_last(person, mine.name)
+    (mine.scene / "report.json").write_text("{")
+    answer = browser.get("/api/arrive")
+    assert answer.status_code == 200 and "damaged" in answer.json()["notes"][0]
+
+
 def test_a_change_is_counted_while_its_body_comes(visit, shared):
     counts = []
 

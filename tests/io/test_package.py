@@ -288,6 +288,31 @@ def test_missing_and_unknown_packages(scene, tmp_path):
         load_scene(root)
 
 
+@pytest.mark.parametrize(
+    ("file", "key", "value", "words"),
+    [
+        ("scene.json", "provenance", [], "provenance"),
+        ("scene.json", "prior", {"predictor": 5, "warnings": []}, "predictor"),
+        ("scene.json", "prior", {"predictor": "made", "warnings": [None]}, "warnings"),
+        ("scene.json", "prior", {"predictor": "made", "warnings": "dim"}, "warnings"),
+        ("report.json", "warnings", [{}], "warnings"),
+        ("report.json", "rerender_psnr_path", "high", "rerender_psnr_path"),
+    ],
+)
+def test_values_of_another_type_are_refused_by_name(scene, tmp_path, file, key, value, words):
+    save_scene(scene, tmp_path / "a.scene")
+    path = tmp_path / "a.scene" / file
+    path.write_text(json.dumps({**json.loads(path.read_text()), key: value}))
+    with pytest.raises(SceneError, match=f"The {words} of the scene cannot be"):
+        load_scene(tmp_path / "a.scene")
+
+
+def test_a_source_of_the_field_of_view_is_a_text(scene, tmp_path):
+    save_scene(replace(scene, photo=replace(scene.photo, fov_source=[1])), tmp_path / "a.scene")
+    with pytest.raises(SceneError, match="fov_source"):
+        load_scene(tmp_path / "a.scene")
+
+
 def test_names_in_another_encoding(scene, tmp_path):
     """A photo may have one; the EXR library cannot be told a folder with one."""
     odd = replace(scene, photo=replace(scene.photo, path="caf\udce9.png"))

@@ -5,6 +5,7 @@ import re
 import secrets
 import shutil
 import time
+import traceback
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from materialist.darkroom.desk import POLL, Desk, Desks, Followed, found_file
 from materialist.darkroom.endpoint import desk_of
 from materialist.darkroom.state import example_file, project_facts, state
 from materialist.darkroom.taking import follow_finals
-from materialist.errors import InputError
+from materialist.errors import InputError, MaterialistError
 from materialist.io.atomic import writing
 from materialist.jobs.queue import Job
 from materialist.studio import SETTINGS
@@ -131,8 +132,13 @@ def arrive(desk: Desk) -> State:
         if session.project is None and desk.expected is None and last in known:
             return open_project(desk, bodies.Named(project=str(last)))
         session.take_over()
-    except InputError as error:
+    except MaterialistError as error:
         return {**state(desk), "notes": [session.without_folders(str(error))]}
+    except Exception as error:
+        # A photo that cannot be shown must not keep its owner from the others.
+        traceback.print_exception(error)
+        words = f"The photo was closed: something went wrong inside ({type(error).__name__})."
+        return {**close_project(desk, bodies.Nothing()), "notes": [words]}
     if session.project is None:
         studio.get_ready()
     return state(desk)

@@ -163,8 +163,8 @@ def _read(folder: Path, most: float) -> Scene:
             materials=_materials(prior_maps),
             normal=prior_maps["normal"],
             depth=prior_maps["depth"],
-            predictor=prior["predictor"],
-            warnings=tuple(prior["warnings"]),
+            predictor=_typed(prior["predictor"], str, "predictor"),
+            warnings=_texts(prior["warnings"]),
             sources=prior.get("sources", {}),
             light=light,
             spread=spread,
@@ -298,10 +298,10 @@ def _read_photo(folder: Path, meta: dict[str, Any], shape: tuple[int, int]) -> P
         camera=Camera(**meta["camera"]),
         original=original,
         hdr=meta["hdr"],
-        fov_source=meta["fov_source"],
+        fov_source=_typed(meta["fov_source"], str, "fov_source"),
         path=meta["path"],
         source=source,
-        warnings=tuple(meta["warnings"]),
+        warnings=_texts(meta["warnings"]),
         deep=bool(meta.get("deep", False)),
         stops=stops,
         layer=meta.get("layer"),
@@ -345,6 +345,7 @@ def _read_meta(folder: Path) -> dict[str, Any]:
             f"{folder} has format version {meta.get('version')}, this program reads version {VERSION}; "
             "open it with the version that wrote it, or invert the photo again."
         )
+    _typed(meta["provenance"], dict, "provenance")
     return meta
 
 
@@ -379,12 +380,24 @@ def _write_json(path: Path, content: dict[str, Any]) -> None:
 def _read_report(folder: Path) -> FitReport:
     content = _read_json(folder, "report.json")
     metrics = {
-        k: math.nan if v is None else v
+        k: math.nan if v is None else _typed(v, (int, float), k)
         for k, v in content.items()
         if k not in ("stages", "warnings")
     }
     return FitReport(
         stages=tuple(content.get("stages", ())),
         metrics=metrics,
-        warnings=tuple(content.get("warnings", ())),
+        warnings=_texts(content.get("warnings", [])),
     )
+
+
+def _texts(values: Any) -> tuple[str, ...]:
+    """The warnings of a JSON file. Raises SceneError unless they are a list of texts."""
+    return tuple(_typed(value, str, "warnings") for value in _typed(values, list, "warnings"))
+
+
+def _typed(value: Any, kind: type | tuple[type, ...], name: str) -> Any:
+    """A value of a JSON file under its name. Raises SceneError for another type of value."""
+    if not isinstance(value, kind):
+        raise SceneError(f"The {name} of the scene cannot be {value!r:.60}; the package is damaged.")
+    return value
