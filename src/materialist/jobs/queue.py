@@ -32,6 +32,8 @@ class Job:
     task: Callable[..., Any] = field(repr=False)
     """Importable function task(report, **arguments)."""
     arguments: dict[str, Any] = field(default_factory=dict)
+    sender: str = ""
+    """The address that it was asked for from."""
     state: str = QUEUED
     stage: str = ""
     done: int = 0

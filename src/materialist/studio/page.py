@@ -16,6 +16,8 @@ class Page:
 
     person: str
     session: Session
+    sender: str = ""
+    """The address that it was opened from, by which pages are counted."""
     seen: float = 0.0
     """When it last asked for something, by the monotonic clock."""
     left: bool = False

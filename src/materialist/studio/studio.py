@@ -93,8 +93,9 @@ class Studio:
         with self._lock:
             known = self._pages.get(name or "")
             if known is None and name:
-                self._check_pages(person)
-                known = self._pages[name] = Page(person, self._new_session(person))
+                sender = self.sender(person)
+                self._check_pages(sender)
+                known = self._pages[name] = Page(person, self._new_session(person), sender)
             if known is None or known.person != person:
                 raise InputError(LOST)
             known.seen = time.monotonic()
@@ -131,10 +132,9 @@ class Studio:
             spare, self._spare = self._spare, None
         return spare if spare is not None and spare.running else None
 
-    def _check_pages(self, person: str) -> None:
-        """Raise InputError where a person's sender has too many pages open."""
-        sender = self.sender(person)
-        count = sum(self.sender(page.person) == sender for page in self._pages.values())
+    def _check_pages(self, sender: str) -> None:
+        """Raise InputError where a sender has too many pages open."""
+        count = sum(page.sender == sender for page in self._pages.values())
         if count >= SETTINGS.pages:
             raise InputError(
                 f"There are {SETTINGS.pages} pages open from your address; close some."
@@ -267,7 +267,7 @@ class Studio:
         unfinished = self.jobs.unfinished()
         sender = self.sender(session.person)
         # Counted by sender, not by person: a new cookie is free.
-        mine = sum(self.sender(job.owner) == sender for job in unfinished)
+        mine = sum(job.sender == sender for job in unfinished)
         all_ = len(unfinished)
         if mine >= SETTINGS.jobs_a_person or all_ >= SETTINGS.jobs:
             whose = (
@@ -278,7 +278,9 @@ class Studio:
             )
         self.quota.check_disk()
         work = partial(tasks.on_device, self.device, task)
-        job = self.jobs.submit(Job(task.__name__, session.person, folder, work, arguments))
+        job = self.jobs.submit(
+            Job(task.__name__, session.person, folder, work, arguments, sender)
+        )
         session.note_job(job)
         return job
 

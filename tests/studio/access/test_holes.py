@@ -143,6 +143,23 @@ def test_jobs_are_counted_by_address(shared, tmp_path):
         shared.submit(shared.page("page", "another").session, wait, tmp_path)
 
 
+def test_pages_and_jobs_count_by_the_address_they_came_from(shared, tmp_path, monkeypatch):
+    """Very many requests of new people make the studio forget which person has which address."""
+    monkeypatch.setattr("materialist.studio.studio.SETTINGS", StudioSettings(people=2, pages=2))
+    shared.note_sender("anna", "1.2.3.4")
+    pages = [shared.page(name, "anna") for name in ("first", "second")]
+    for _ in range(SETTINGS.jobs_a_person):
+        shared.submit(pages[0].session, wait, tmp_path)
+    for number in range(3):
+        shared.note_sender(f"new{number}", "1.2.3.4")
+    assert "anna" not in shared.senders
+    with pytest.raises(InputError, match="2 pages open from your address"):
+        shared.page("third", "new2")
+    session = shared._new_session("new2")
+    with pytest.raises(InputError, match="6 jobs waiting or running"):
+        shared.submit(session, wait, tmp_path)
+
+
 def test_a_promise_is_settled_with_the_address_that_made_it(shared):
     """A cookie that goes on from another address gets no credit there."""
     claim = shared.quota.claim("1.2.3.4", 50_000_000)
