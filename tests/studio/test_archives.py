@@ -8,7 +8,7 @@ import pytest
 from studio_scenes import block, click, package, zipped
 
 from materialist.edits.recipe import Step, apply, read_recipe
-from materialist.errors import InputError
+from materialist.errors import InputError, OutputError
 from materialist.io.exr import write_exr
 from materialist.io.image import write_png
 from materialist.studio import StudioSettings, objects, tasks, uploads
@@ -172,6 +172,29 @@ def test_other_requests_go_on_while_a_list_is_opened(session, tmp_path, monkeypa
     session.read_edits(tmp_path / "edits.yaml")
     session.read_edits(zipped(tmp_path / "a.zip", {"edits.yaml": "- relight: {rotate: 4}\n"}))
     assert selected == [True, True] and session.edits.steps[0].options == {"rotate": "4"}
+
+
+def test_a_zip_is_unpacked_beside_the_upload(session, tmp_path, monkeypatch):
+    """There a studio that is killed leaves nothing: uploads go when it starts again."""
+    places = []
+
+    def opened(*given, folder, **arguments):
+        places.append(folder)
+        raise InputError("no list")
+
+    monkeypatch.setattr(uploads, "opened_upload", opened)
+    with pytest.raises(InputError, match="no list"):
+        session.read_edits(zipped(tmp_path / "a.zip", {}))
+    assert places[0].parent == tmp_path and not places[0].exists()
+
+
+def test_a_zip_that_has_no_room_is_refused_in_words(session, tmp_path, monkeypatch):
+    def full(**given):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("tempfile.TemporaryDirectory", full)
+    with pytest.raises(OutputError, match="no space left"):
+        session.read_edits(zipped(tmp_path / "a.zip", {}))
 
 
 def test_only_what_the_list_names_is_unpacked_from_a_folder_in_the_zip(tmp_path):

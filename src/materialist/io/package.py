@@ -399,5 +399,7 @@ def _texts(values: Any) -> tuple[str, ...]:
 def _typed(value: Any, kind: type | tuple[type, ...], name: str) -> Any:
     """A value of a JSON file under its name. Raises SceneError for another type of value."""
     if not isinstance(value, kind):
-        raise SceneError(f"The {name} of the scene cannot be {value!r:.60}; the package is damaged.")
+        raise SceneError(
+            f"The {name} of the scene cannot be {value!r:.60}; the package is damaged."
+        )
     return value

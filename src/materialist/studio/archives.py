@@ -15,8 +15,8 @@ from typing import Any
 
 from materialist.edits.recipe import MAX_BYTES, Step, read_recipe
 from materialist.errors import InputError
-from materialist.io.atomic import SCENE_FILES
-from materialist.io.decode import image_size
+from materialist.io.atomic import SCENE_FILES, writing
+from materialist.io.image import write_png
 from materialist.io.package import load_scene
 from materialist.studio import SETTINGS, uploads
 from materialist.studio.access.quota import Allowance, folder_size
@@ -46,11 +46,16 @@ def pack_edits(steps: tuple[Step, ...], edits: Path, target: Path) -> None:
 def unpack(workspace: Path, archive: Path, allowance: Allowance) -> tuple[Step, ...]:
     """The steps of a zip that `pack_edits` wrote, their files in the workspace under names of ours.
 
-    Only the list and the files that it names are read, each checked as an upload of its own is. Raises InputError.
+    Only the list and the files that it names are read, each checked as an upload of its own is.
+
+    Raises InputError, OutputError.
     """
-    with tempfile.TemporaryDirectory(dir=workspace, prefix=".load-") as place:
+    # Unpacked beside the upload first: what is refused, or ended by a kill, leaves nothing in the workspace.
+    with (
+        writing(workspace),
+        tempfile.TemporaryDirectory(dir=archive.parent, prefix=".load-") as place,
+    ):
         folder = Path(place)
-        # Unpacked beside the workspace first: what is refused leaves nothing behind.
         steps, readable = uploads.opened_upload(extract_list, archive, allowance, folder=folder)
 
         def moved(option: str, name: str) -> str:
@@ -132,13 +137,8 @@ def extract_scene(report: Any, file: Path, target: Path) -> None:
             f"{shown} holds a photo of {width} x {height} pixels; the studio takes up to "
             f"{SETTINGS.upload_pixels / 1e6:g} megapixels. Shrink the photo, and invert it again."
         )
-    # `load_scene` does not read it, but the server does, for the list of photos.
-    shown_photo = target / "photo.png"
-    size = image_size(shown_photo) if shown_photo.is_file() else None
-    if size not in (None, (camera.width, camera.height)):
-        raise InputError(
-            f"{shown} is damaged: its photo.png is {size[0]} x {size[1]}; zip it again."
-        )
+    # The server reads it, for the list of photos, and `load_scene` does not: it is written anew.
+    write_png(target / "photo.png", scene.photo.linear)
 
 
 @contextmanager

@@ -213,12 +213,13 @@ def test_a_mesh_of_many_faces_is_refused(tmp_path, monkeypatch):
         uploads.checked_upload(None, tmp_path / "box.ply", uploads.MESH)
 
 
-def test_a_large_thumbnail_in_a_small_scene_is_refused(tmp_path):
+def test_the_thumbnail_of_a_scene_is_made_here(tmp_path):
     """The server itself opens it, and a few kilobytes of PNG can stand for gigabytes."""
     large = cv2.imencode(".png", np.zeros((4000, 4000, 3), np.uint8))[1].tobytes()
     file = zipped_package(tmp_path, **{"photo.png": large})
-    with pytest.raises(InputError, match=r"photo\.png is 4000 x 4000"):
-        archives.extract_scene(None, file, tmp_path / "target")
+    archives.extract_scene(None, file, tmp_path / "target")
+    made = (tmp_path / "target" / "photo.png").read_bytes()
+    assert made == (tmp_path / "room.scene" / "photo.png").read_bytes()
 
 
 def test_a_large_scene_is_refused(tmp_path, monkeypatch):
