@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from materialist.studio.workspace import CARD, WorkFolder, person_of
+from materialist.errors import InputError, OutputError
+from materialist.studio.workspace import CARD, LAST, WorkFolder, person_of
 
 
 def test_a_project_survives_a_restart(tmp_path):
@@ -46,12 +47,31 @@ def test_downloads_carry_the_name_of_the_photo(tmp_path, title, stem):
     assert WorkFolder(tmp_path).new(title, "me").stem == stem
 
 
-def test_a_damaged_card_hides_its_project_alone(tmp_path):
+@pytest.mark.parametrize("card", ["{", "[" * 100_000])
+def test_a_damaged_card_hides_its_project_alone(tmp_path, card):
     work = WorkFolder(tmp_path)
     broken = work.new("a", "me")
     good = work.new("b", "me")
-    (broken.folder / CARD).write_text("{")
+    (broken.folder / CARD).write_text(card)
+    (tmp_path / LAST).write_text(card)
     assert [p.name for p in work.projects()] == [good.name]
+    assert work.read_last() == {}
+
+
+def test_a_scene_whose_name_is_too_long_is_not_ready(tmp_path):
+    project = WorkFolder(tmp_path).new("a", "me")
+    assert not replace(project, scene=project.folder / ("x" * 5000)).ready
+
+
+def test_a_photo_that_is_discarded_does_not_come_back(tmp_path):
+    work = WorkFolder(tmp_path)
+    project = work.new("a", "me")
+    work.discard(project)
+    with pytest.raises(OutputError, match="edits-me cannot be written"):
+        project.workspace("me")
+    with pytest.raises(InputError, match="no longer in the work folder"):
+        work.rename(project, "b")
+    assert not project.folder.exists()
 
 
 def test_the_newest_photo_is_first_and_no_folder_is_two_studios(tmp_path, monkeypatch):

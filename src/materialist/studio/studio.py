@@ -29,7 +29,7 @@ from materialist.studio.access.quota import Allowance, Claim, Quota, sender_of
 from materialist.studio.live import warmed
 from materialist.studio.page import Page
 from materialist.studio.session import ENDING, Session
-from materialist.studio.workspace import LOST, Project, WorkFolder, person_of
+from materialist.studio.workspace import GONE, LOST, Project, WorkFolder, person_of
 
 LOCAL_PERSON = "me"
 """The person, where the studio serves this machine only."""
@@ -183,7 +183,7 @@ class Studio:
         for project in self.projects(person):
             if project.name == name:
                 return project
-        raise InputError("This photo is no longer in the work folder; open it again.")
+        raise InputError(GONE)
 
     def open(self, page: Page, name: str) -> None:
         """Show a project of this person on a page; where another page of theirs shows it, both share the session.
@@ -278,9 +278,7 @@ class Studio:
             )
         self.quota.check_disk()
         work = partial(tasks.on_device, self.device, task)
-        job = self.jobs.submit(
-            Job(task.__name__, session.person, folder, work, arguments, sender)
-        )
+        job = self.jobs.submit(Job(task.__name__, session.person, folder, work, arguments, sender))
         session.note_job(job)
         return job
 

@@ -37,6 +37,7 @@ SCENE = "photo.scene"
 LAST = "last.json"
 """The file of the work folder that says which project each person had last."""
 LOST = "The page has lost its session; reload it."
+GONE = "This photo is no longer in the work folder; open it again."
 _NAME = re.compile(r"photo-\d{3,6}")
 _CACHE = "materialist-cache-"
 _DISCARDED = "discarded-"
@@ -68,15 +69,18 @@ class Project:
 
     @property
     def ready(self) -> bool:
-        return (self.scene / "scene.json").is_file()
+        with suppress(OSError):  # a name that is too long
+            return (self.scene / "scene.json").is_file()
+        return False
 
     def workspace(self, person: str) -> Path:
         """The folder for the edits and results of one person; made on first use. Raises OutputError."""
         if not _PERSON.fullmatch(person):
             raise InputError(f"{person!r} is not a valid name for a workspace.")
         folder = self.folder / f"edits-{person}"
+        # Not those above it: a photo that was discarded meanwhile must not come back.
         with writing(folder):
-            make_folder(folder)
+            folder.mkdir(exist_ok=True)
         return folder
 
 
@@ -159,7 +163,7 @@ class WorkFolder:
         return project
 
     def rename(self, project: Project, title: str) -> Project:
-        """Give a project another title. Raises OutputError where it cannot be written."""
+        """Give a project another title. Raises InputError where it is gone, OutputError where it cannot be written."""
         renamed = replace(project, title=_shown(title))
         _change_card(project, title=renamed.title)
         return renamed
@@ -170,7 +174,7 @@ class WorkFolder:
 
     def read_last(self) -> dict[str, str]:
         """What `write_last` kept; nothing where it cannot be read: people then choose a photo."""
-        with suppress(OSError, ValueError, AttributeError):
+        with suppress(OSError, ValueError, AttributeError, RecursionError):
             kept = json.loads((self.root / LAST).read_text("utf-8"))
             return {str(person): str(name) for person, name in kept.items()}
         return {}
@@ -205,8 +209,11 @@ class WorkFolder:
 
 
 def _change_card(project: Project, **facts: str) -> None:
-    """Write other facts of a project. Raises OutputError."""
-    card = json.loads((project.folder / CARD).read_text("utf-8"))
+    """Write other facts of a project. Raises InputError where it is gone, OutputError."""
+    try:
+        card = json.loads((project.folder / CARD).read_text("utf-8"))
+    except OSError as error:
+        raise InputError(GONE) from error
     write_whole(project.folder / CARD, json.dumps({**card, **facts}, indent=1))
 
 
@@ -257,7 +264,7 @@ def _read(folder: Path) -> Project | None:
         return Project(
             folder, str(card["title"]), str(card["owner"]), (folder / card["scene"]).resolve()
         )
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return None
 
 
