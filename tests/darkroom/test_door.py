@@ -1,5 +1,6 @@
 """Attacks on the darkroom's server: what gets past its door, and what does not."""
 
+import json
 import re
 from contextlib import ExitStack
 
@@ -212,6 +213,22 @@ def test_a_promise_that_is_not_kept_costs_nothing_and_leaves_nothing(visit, shar
     )
     assert answer.status_code == 400
     assert {*shared.work.cache.iterdir()} == before and shared.quota._stored("1.2.3.4") == 0
+
+
+def test_an_upload_that_cannot_be_stored_counts_nothing(visit, shared, monkeypatch):
+    browser = visit()
+    monkeypatch.setattr(shared.work, "cache", shared.work.root / "missing")
+    answer = browser.post("/api/upload?name=a.png", content=b"x")
+    assert answer.status_code == 400 and "a.png cannot be written" in answer.json()["error"]
+    assert shared.quota._stored("1.2.3.4") == 0
+
+
+def test_titles_that_are_no_unicode_are_answered(visit, shared, monkeypatch):
+    browser = visit()
+    card = json.loads((shared.start.folder / "project.json").read_text())
+    (shared.start.folder / "project.json").write_text(json.dumps({**card, "title": "a\ud800"}))
+    shared.start = shared.work.projects()[0]
+    assert browser.get("/api/projects").json()[0]["title"] == "a\ud800"
 
 
 def test_uploads_have_a_quota(visit, monkeypatch):

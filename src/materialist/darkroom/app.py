@@ -10,7 +10,7 @@ from typing import Any
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
-from starlette.responses import FileResponse, JSONResponse, PlainTextResponse, Response
+from starlette.responses import FileResponse, PlainTextResponse, Response
 from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
@@ -18,7 +18,7 @@ from starlette.websockets import WebSocket
 from materialist.darkroom import bodies, editing, opening, seeing, taking
 from materialist.darkroom.channel import channel
 from materialist.darkroom.desk import Desk, Desks
-from materialist.darkroom.endpoint import got, guarded, posted
+from materialist.darkroom.endpoint import Answer, got, guarded, posted
 from materialist.darkroom.state import (
     about,
     example_file,
@@ -212,7 +212,7 @@ def _picture(desk: Desk, request: Request) -> Response:
 
 
 def _json(content: Any) -> Response:
-    return JSONResponse(content, headers={"cache-control": "no-store"})
+    return Answer(content, headers={"cache-control": "no-store"})
 
 
 def _jpeg(content: bytes) -> Response:

@@ -1,5 +1,6 @@
 """From a function of a desk to an endpoint: who asks, what the body says, and errors as sentences."""
 
+import json
 import traceback
 from collections.abc import Awaitable, Callable
 from contextlib import AbstractContextManager
@@ -19,6 +20,13 @@ from materialist.studio.studio import LOCAL_PERSON, PERSON_HEADER, Studio
 
 Kind = TypeVar("Kind", bound=RequestBody)
 Answerer = Callable[[Request], Awaitable[Response]]
+
+
+class Answer(JSONResponse):
+    """JSON in ASCII: names of files may hold surrogates, which UTF-8 has not."""
+
+    def render(self, content: Any) -> bytes:
+        return json.dumps(content, allow_nan=False, separators=(",", ":")).encode()
 
 
 def person_of(studio: Studio, request: Any) -> str:
@@ -44,7 +52,7 @@ def posted(desks: Desks, kind: type[Kind], change: Callable[[Desk, Kind], Any]) 
             def changed(desk: Desk) -> Any:
                 return change(desk, kind.model_validate_json(raw or b"{}"))
 
-            return JSONResponse(await run_in_threadpool(_at_desk, desks, request, changed))
+            return Answer(await run_in_threadpool(_at_desk, desks, request, changed))
 
     return guarded(desks.studio, answer)
 
@@ -100,4 +108,4 @@ def guarded(studio: Studio, answer: Answerer) -> Answerer:
 
 
 def refusal(words: str, status: int) -> Response:
-    return JSONResponse({"error": words}, status)
+    return Answer({"error": words}, status)

@@ -38,10 +38,11 @@ async def receive_upload(desks: Desks, request: Request) -> Response:
     with studio.quota.uploading(sender):
         claim = studio.quota.claim(sender, size)
         folder = studio.work.cache / secrets.token_hex(16)
-        folder.mkdir()
         file = folder / _safe_name(request.query_params.get("name", ""))
         stored = 0
         try:
+            with writing(file.name):
+                folder.mkdir()
             stored = await _written(request, file, size)
         except (ClientDisconnect, TimeoutError) as error:
             raise InputError("The upload ended too early; send the file again.") from error
