@@ -297,6 +297,9 @@ def test_a_photo_that_cannot_be_shown_does_not_lock_its_owner_out(visit, shared,
     answer = browser.get("/api/arrive")
     assert answer.status_code == 200 and "TypeError" in answer.json()["notes"][0]
     assert answer.json()["project"] is None and person not in shared.last
+    # One that was not taken apart to the end is not offered either.
+    shared.note_last(person, shared.work.new("Unfinished", person).name)
+    assert "notes" not in browser.get("/api/arrive").json()
     # A damaged one stays the last: its sentence says what to do.
     monkeypatch.undo()
     shared.note_last(person, mine.name)

@@ -128,7 +128,7 @@ def arrive(desk: Desk) -> State:
     studio = desk.studio
     start = studio.start.name if isinstance(studio.start, Project) else None
     last = studio.last.get(desk.person) or start
-    known = {project.name for project in studio.projects(desk.person)}
+    known = {project["name"] for project in listed(desk)}
     try:
         if session.project is None and desk.expected is None and last in known:
             return open_project(desk, bodies.Named(project=str(last)))
