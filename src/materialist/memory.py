@@ -8,6 +8,7 @@ from contextlib import contextmanager, suppress
 _M_TRIM_THRESHOLD = -1
 _M_MMAP_THRESHOLD = -3
 _M_MMAP_MAX = -4
+_M_ARENA_MAX = -8
 _MEGABYTE = 2**20
 
 
@@ -34,6 +35,12 @@ def give_back() -> None:
     gc.collect()
     with suppress(OSError, AttributeError):  # glibc has it
         ctypes.CDLL(None).malloc_trim(0)
+
+
+def limit_heaps(count: int) -> None:
+    """Let all threads to come share so many heaps; glibc gives each its own, with what it freed, up to 8 a core."""
+    with suppress(OSError, AttributeError):  # glibc has it
+        ctypes.CDLL(None).mallopt(_M_ARENA_MAX, count)
 
 
 def _limits(mapped: int, trimmed: int) -> None:

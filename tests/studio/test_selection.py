@@ -90,13 +90,20 @@ def test_only_what_has_the_material_of_the_click():
     one = Selection((np.eye(48, 64, dtype=bool),)).click(
         scene, 25, 24, "add", lambda click: whole.copy()
     )
-    narrow = one.of_material(scene)
+    asked = []
+
+    def narrowed(region, click):
+        asked.append(click)
+        return region & block()
+
+    narrow = one.of_material(narrowed)
+    assert asked == [(25, 24)]
     assert overlap(narrow.parts[-1], block()) > 0.9 and narrow.clicked == one.clicked
     assert np.array_equal(narrow.parts[0], one.parts[0])
     with pytest.raises(InputError, match="seems to be of one material"):
-        narrow.of_material(scene)
+        narrow.of_material(narrowed)
     with pytest.raises(InputError, match="Click an object first"):
-        Selection((whole,)).of_material(scene)
+        Selection((whole,)).of_material(narrowed)
 
 
 def test_alt_takes_a_thing_from_the_part_it_lies_in():
@@ -107,17 +114,20 @@ def test_alt_takes_a_thing_from_the_part_it_lies_in():
     right[36:44, 50:60] = True
     asked = []
 
-    def choose(click, extent="auto"):
-        asked.append((click, extent))
-        if extent != "small":
+    thing = np.zeros((48, 64), bool)
+    thing[34:44, 2:20] = True
+
+    def choose(click=None, mask=None, exclude=None):
+        if mask is None:
             return left.copy()
-        thing = np.zeros((48, 64), bool)
-        thing[34:44, 2:20] = True
-        return thing
+        asked.append(exclude)
+        if exclude != (10, 40):
+            raise InputError("That is most of the selection.")
+        return mask & ~thing
 
     two = Selection((right,)).click(scene, 25, 12, "add", choose)
     after = two.click(scene, 10, 40, "remove", choose)
-    assert asked[-1] == ((10, 40), "small")
+    assert asked == [(10, 40)]
     assert np.array_equal(after.parts[0], right)
     assert not after.parts[1][36:44, 2:18].any() and after.parts[1][10:30, 4:38].all()
     assert after.clicked == (25, 12)  # S goes on from there

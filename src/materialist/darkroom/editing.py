@@ -1,5 +1,6 @@
 """Requests that select and change: each returns the page's new state."""
 
+from functools import partial
 from typing import Any
 
 from materialist.darkroom import bodies
@@ -73,7 +74,8 @@ def resize(desk: Desk, body: bodies.Resized) -> State:
 def keep_material(desk: Desk, body: bodies.Nothing) -> State:
     """Of what the last click selected only what has its material."""
     session = desk.session
-    session.reselect(lambda selection: selection.of_material(session.scene))
+    narrowed = partial(session.preview.call, views.of_material)
+    session.reselect(lambda selection: selection.of_material(narrowed))
     return state(desk)
 
 

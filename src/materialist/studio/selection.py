@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 
 from materialist.edits.select.extents import LARGER, next_region
-from materialist.edits.select.parts import of_material, piece_at, without
+from materialist.edits.select.parts import piece_at
 from materialist.errors import InputError
 from materialist.studio.live import PreviewLost
 from materialist.types import Array, Scene
@@ -96,15 +96,17 @@ class Selection:
             f"Nothing {size} is found at that click; add another click, or use the brush."
         )
 
-    def of_material(self, scene: Scene) -> Selection:
+    def of_material(self, narrowed: Callable[..., Array]) -> Selection:
         """With only what has the material of the last click, of what that selected.
+
+        narrowed: [H, W] bool of a `region` and a `click` in it, as `views.of_material` gives it.
 
         Raises InputError where that is all of it.
         """
         if self.clicked is None:
             raise InputError("Click an object first; then its material can be selected.")
         *rest, region = self.parts
-        part = of_material(scene.materials.albedo, region, [self.clicked])
+        part = narrowed(region=region, click=self.clicked)
         if LARGER * part.sum() > region.sum():
             raise InputError(
                 "All that is selected there seems to be of one material; take parts away with Alt, or use the brush."
@@ -143,22 +145,19 @@ class Selection:
         return Selection((*self.parts, region) if mode == ADD else (region,))
 
     def _reduced(self, scene: Scene, choose: Choose, row: int, column: int) -> Selection:
-        """Without the thing, or else what is of one colour, at a pixel of it."""
-        try:
-            thing = choose(click=(column, row), extent="small")
-        except PreviewLost:
-            raise
-        except InputError:  # the network sees none there
-            thing = None
-        albedo = scene.materials.albedo
-        point = (column, row)
+        """Without the part, or else what is of one colour, at a pixel of it."""
         last = self.clicked
         parts = []
         for part in self.parts:
-            rest: Array | None = part
+            rest = part
             if part[row, column]:
-                rest = without(albedo, part, point, thing, [last] if last else [])
-            parts.append(part & ~piece_at(albedo, part, point) if rest is None else rest)
+                try:
+                    rest = choose(mask=part, exclude=(column, row))
+                except PreviewLost:
+                    raise
+                except InputError:  # it is most of the part
+                    rest = part & ~piece_at(scene.materials.albedo, part, (column, row))
+            parts.append(rest)
         # The last click still is that of the last part, where it lies on it.
         held = last is not None and bool(parts[-1][last[1], last[0]])
         return Selection(tuple(p for p in parts if p.any()), last if held else None)

@@ -13,6 +13,7 @@ from typing import Any
 from materialist.errors import InputError
 from materialist.io.photo import PREFIX, example_path
 from materialist.jobs.queue import JobQueue
+from materialist.memory import limit_heaps
 from materialist.studio import SETTINGS, uploads
 from materialist.studio.studio import LOCAL_PERSON, Studio
 from materialist.studio.workspace import Project, WorkFolder
@@ -101,6 +102,8 @@ def serve(
 
     from materialist.studio.access.connections import Connection, ProxiedConnection
 
+    # Of its forty threads each would keep freed memory: 100 MB after a photo.
+    limit_heaps(2)
     # --- The server, which says nothing of itself and believes no proxy's headers ---
     config = uvicorn.Config(
         page,

@@ -10,6 +10,7 @@ from materialist.color import srgb_levels
 from materialist.edits.core.surfaces import texels
 from materialist.edits.recipe import Step, region_of
 from materialist.edits.remove.filling import NotFilled, remembered_alone
+from materialist.edits.select import material
 from materialist.edits.select.select import select
 from materialist.errors import InputError, MaterialistError
 from materialist.io import display
@@ -65,6 +66,11 @@ def look_ahead(live: LivePreview) -> None:
 def selected(live: LivePreview, where: dict[str, Any]) -> Array:
     """[H, W] bool: `select` with these keywords."""
     return select(live.scene, **where)
+
+
+def of_material(live: LivePreview, region: Array, click: tuple[int, int]) -> Array:
+    """[H, W] bool: what of a region [H, W] bool has the material of a click in it."""
+    return material.of_material(live.scene, region, [click])
 
 
 def region(live: LivePreview, step: Step) -> Array:

@@ -1,81 +1,13 @@
-"""What has one material, and what one more click takes away."""
-
-from dataclasses import replace
+"""What one more click takes away."""
 
 import numpy as np
 import pytest
-from edit_scenes import scene_of
+from part_scenes import CLOTH, LEGS, SHADE, THING, H, W, albedo, scene
 
 from materialist.edits.select import select as selecting
-from materialist.edits.select.parts import of_material, without
+from materialist.edits.select.parts import without
 from materialist.edits.select.select import select
 from materialist.errors import InputError
-from materialist.types import Camera
-
-H, W = 90, 120
-THING = np.zeros((H, W), bool)
-THING[10:80, 20:100] = True
-LEGS = np.zeros((H, W), bool)
-LEGS[60:80, 20:100] = True
-SHADE = np.zeros((H, W), bool)
-SHADE[10:60, 70:100] = True
-CLOTH = (60, 30)
-
-
-def albedo(shade=0.6):
-    """Red cloth, part of it darker, on brown legs; grey beyond."""
-    rng = np.random.default_rng(2)
-    colour = np.full((H, W, 3), 0.5)
-    colour[THING] = (0.5, 0.1, 0.1)
-    colour[SHADE] *= shade
-    colour[LEGS] = (0.25, 0.18, 0.1)
-    return (colour * rng.uniform(0.95, 1.05, (H, W, 1))).astype(np.float32)
-
-
-def scene():
-    made = scene_of(
-        Camera(W, H, 40.0),
-        np.full((H, W), 2, np.float32),
-        np.broadcast_to([0, 0, 1], (H, W, 3)),
-        albedo(),
-        completion="none",
-    )
-    return replace(made, materials=replace(made.materials, albedo=albedo()))
-
-
-def test_a_material_is_all_of_its_colour_in_the_selection_and_shade_is_none():
-    part = of_material(albedo(), THING, [CLOTH])
-    assert (part != (THING & ~LEGS)).mean() < 0.01
-    assert not part[~THING].any()
-
-
-def test_each_click_names_a_material():
-    both = of_material(albedo(), THING, [CLOTH, (60, 70)])
-    assert (both != THING).mean() < 0.01
-    assert (of_material(albedo(), THING, [(60, 70)]) != LEGS).mean() < 0.01
-
-
-def test_what_is_around_a_click_stays_whatever_colour_it_has():
-    colour = albedo()
-    colour[40:43, 40:43] = (0.1, 0.1, 0.6)
-    part = of_material(colour, THING, [(41, 41)])
-    assert part[40:43, 40:43].all() and (part != (THING & ~LEGS)).mean() < 0.01
-
-
-def test_highlights_and_seams_stay_and_specks_go():
-    colour = albedo(shade=1)
-    colour[20:26, 30:36] = (0.8, 0.7, 0.7)  # 36 of 4000 pixels
-    colour[30:32, 20:100] = (0.02, 0.02, 0.02)
-    colour[70, 30:33] = (0.5, 0.1, 0.1)  # on a leg
-    part = of_material(colour, THING, [CLOTH])
-    assert part[20:26, 30:36].all() and part[30:32, 20:100].all() and not part[70, 30:33].any()
-    colour[12:28, 25:50] = (0.8, 0.7, 0.7)  # a tenth is another material
-    assert not of_material(colour, THING, [CLOTH])[14:26, 27:48].any()
-
-
-def test_black_parts_of_a_white_thing_are_another_material():
-    colour = np.where(LEGS[..., None], 0.02, np.full((H, W, 3), 0.7)).astype(np.float32)
-    assert (of_material(colour, THING, [CLOTH]) != (THING & ~LEGS)).mean() < 0.01
 
 
 def test_an_excluded_click_takes_the_thing_there():
@@ -117,12 +49,19 @@ def test_select_narrows_what_it_found(monkeypatch):
     asked = []
 
     def objects(scene, points, *, extent="auto", network=True):
-        if extent == "small":
-            asked.append(points[0])
-            return LEGS if points[0][1] > 60 else SHADE
         return THING
 
+    def part_at(scene, mask, point):
+        asked.append(point)
+        return LEGS if point[1] > 60 else SHADE
+
+    def without_legs(scene, mask, points, *, network):
+        assert network
+        return mask & ~LEGS if (60, 70) not in points else mask
+
     monkeypatch.setattr(selecting, "object_at_points", objects)
+    monkeypatch.setattr(selecting, "part_at", part_at)
+    monkeypatch.setattr(selecting, "of_material", without_legs)
     cloth = select(made, click=CLOTH, same_material=True)
     assert (cloth != (THING & ~LEGS)).mean() < 0.01
     both = select(made, click=[CLOTH, (60, 70)], same_material=True)
@@ -144,6 +83,8 @@ def test_grabcut_goes_by_colour_alone(monkeypatch):
         return THING
 
     monkeypatch.setattr(selecting, "object_at_points", objects)
+    cloth = select(scene(), click=CLOTH, method="grabcut", same_material=True)
+    assert (cloth != (THING & ~LEGS)).mean() < 0.01
     kept = select(scene(), click=CLOTH, method="grabcut", exclude=(30, 70))
     assert (kept != (THING & ~LEGS)).mean() < 0.02
 

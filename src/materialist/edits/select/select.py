@@ -12,6 +12,7 @@ from materialist.edits.core.region import (
     checked_pixel,
     checked_region,
 )
+from materialist.edits.select.material import of_material, part_at
 from materialist.edits.select.objects import (
     EXTENTS,
     SETTINGS,
@@ -19,7 +20,7 @@ from materialist.edits.select.objects import (
     object_at_points,
     object_in,
 )
-from materialist.edits.select.parts import of_material, without
+from materialist.edits.select.parts import without
 from materialist.errors import InputError
 from materialist.forks import check_process
 from materialist.geometry.silhouette import window
@@ -56,7 +57,7 @@ def select(
             the network sees there.
         same_material: of the object at the clicks only what has the material of one of them: cloth without legs. It
             goes by colour: grey paint and grey glass are alike.
-        exclude: (x, y), or several, of what is taken away again: the smallest object there, or what is of one colour.
+        exclude: (x, y), or several, of what is taken away again: the smallest part there, or what is of one colour.
         method: `network` (MobileSAM and ClickNet) or `grabcut` (by colours alone); `sam2` is `network`.
         device: of no effect; both run on the processor.
 
@@ -110,7 +111,7 @@ def select(
         )
     # --- The part of it that is meant ---
     if same_material:
-        region = of_material(scene.materials.albedo, region, points)
+        region = of_material(scene, region, points, network=network)
     return _reduced(scene, region, unwanted, points, network=network)
 
 
@@ -132,8 +133,8 @@ def _reduced(
         # One of them may have taken another with it.
         if not region[y, x]:
             continue
-        thing = _smallest(scene, (x, y)) if network else None
-        rest = without(scene.materials.albedo, region, (x, y), thing, points)
+        part = part_at(scene, region, (x, y)) if network else None
+        rest = without(scene.materials.albedo, region, (x, y), part, points)
         if rest is None:
             raise InputError(
                 f"What is at {x},{y} is most of the selection, or holds one of its clicks; click another place of "
@@ -141,14 +142,6 @@ def _reduced(
             )
         region = rest
     return region
-
-
-def _smallest(scene: Scene, point: tuple[int, int]) -> Array | None:
-    """[H, W] bool of the smallest object at a point; None where the network sees none."""
-    try:
-        return object_at_points(scene, [point], extent="small")
-    except InputError:
-        return None
 
 
 def _points(scene: Scene, click) -> list[tuple[int, int]]:
