@@ -597,14 +597,15 @@ CONTRAST = """() => {
   const low = [];
   for (const n of document.querySelectorAll('button, label, span, p, h1, h2, h3, b, li, summary, code, input')) {
     const text = [...n.childNodes].some((c) => c.nodeType === 3 && /\\w/.test(c.textContent));
-    if (!text || n.disabled || n.closest(':disabled')) continue;
+    const icon = n.matches('.icon-only[aria-pressed=true]');
+    if (!(text || icon) || n.disabled || n.closest(':disabled')) continue;
     if (!n.checkVisibility({visibilityProperty: true, opacityProperty: true}) || n.closest('#stage')) continue;
     const ink = rgba(getComputedStyle(n).color);
     let paper = null;
     for (let p = n; p && !paper; p = p.parentElement) {
       const b = rgba(getComputedStyle(p).backgroundColor); if (b[3] > .8) paper = b; }
     const [a, b] = [lum(ink), lum(paper || [255, 255, 255])].sort((x, y) => y - x);
-    if ((a + .05) / (b + .05) < 4.5) low.push([n.tagName, n.textContent.trim().slice(0, 40)]);
+    if ((a + .05) / (b + .05) < 4.5) low.push([n.tagName, n.ariaLabel || n.textContent.trim().slice(0, 40)]);
   }
   return low; }"""
 UNNAMED = """() => [...document.querySelectorAll('button, input, select, [role=application], [role=slider]')]
@@ -625,6 +626,9 @@ def test_text_is_readable_and_things_have_names(page):
             page.wait_for_selector("#panel .group")
             assert page.evaluate(CONTRAST) == [], (theme, name)
             assert page.evaluate(UNNAMED) == [], name
+        # A pressed tool can be seen, too, while the pointer is over it.
+        page.locator(".tools .icon-only[aria-pressed=true]").first.hover()
+        assert page.evaluate(CONTRAST) == [], theme
         for opener in ("Photos", "Take away", "Help"):
             page.get_by_role("button", name=opener).first.click()
             page.wait_for_selector("[role=dialog]")

@@ -512,6 +512,19 @@ def rerender_of(preview):
     return preview.edited(()).rerender
 
 
+def test_a_page_that_opens_an_edited_photo_asks_for_its_edits(client):
+    before = pixels(client.get("/api/state").json())
+    select_block(client)
+    after = pixels(change(client, hue=120).json())
+    name = client.get("/api/state").json()["project"]["name"]
+    # The photo at once, and that its edits are not in it yet, although there is a preview.
+    opened = client.post("/api/open", json={"project": name}).json()
+    assert not opened["ready"]
+    shown = client.get("/api/state").json()
+    assert shown["ready"] and np.abs(pixels(shown).astype(int) - before).max() > 20
+    np.testing.assert_array_equal(pixels(shown), after)
+
+
 def test_photos_are_opened_renamed_and_deleted(client, tmp_path):
     content = zipped_package(tmp_path).read_bytes()
     sent = client.post("/api/upload?name=kitchen.zip", content=content).json()

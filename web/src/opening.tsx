@@ -1,16 +1,18 @@
 // The sheet that opens photos: dropped, recent, or an example.
-import { useState } from "preact/hooks";
+import { useEffect, useState } from "preact/hooks";
 import { address } from "./api";
 import { FileButton, Fold } from "./controls";
 import { Dialog } from "./dialog";
 import { Icon } from "./icons";
-import { change, editProjects, openFile, set, start, useView, view } from "./store";
+import { change, editProjects, listProjects, openFile, set, start, useView, view } from "./store";
 import { t } from "./strings";
 import type { Project } from "./types";
 
 export function OpenSheet() {
   const { about, projects, state, size, predictor, fov } = useView();
   const held = !!(state?.project || state?.expected);
+  // Another tab may have renamed or deleted photos.
+  useEffect(() => void listProjects(), []);
   const accept = ["image/*", ".zip", ...(about?.photos ?? [])].join(",");
   return (
     <Dialog title={t.openTitle} kind={held ? "open" : "open first"} close={held ? () => set({ sheet: "" }) : undefined}>

@@ -182,7 +182,9 @@ export function Stage() {
     if (!event.isPrimary || !usable) return;
     setRing(tool === "brush" && inside(event) ? at(event) : null);
     if (gesture) return setGesture({ ...gesture, path: [...gesture.path, at(event)] });
-    if (tool === "click" && !dropper && event.pointerType === "mouse" && inside(event)) pointing.over(at(event));
+    // A click that takes away takes a part, not the thing that is outlined.
+    const outlines = tool === "click" && !dropper && modeOf(event) !== "remove";
+    if (outlines && event.pointerType === "mouse" && inside(event)) pointing.over(at(event));
     else pointing.out();
   };
   const up = (event: PointerEvent) => {

@@ -56,7 +56,8 @@ def state(
             "revision": revision,
             "project": project_facts(session.project),
             "expected": project_facts(desk.expected),
-            "ready": session.live is not None and session.live.ready,
+            # A page that has not got the edits yet asks again when there is a preview.
+            "ready": with_edits and session.live is not None and session.live.ready,
             "traced": session.live is not None and is_traced(session.live.scene),
             "original": _original(desk),
             "stage": {**shown, "region": outlined, "clicked": selection.clicked is not None},

@@ -119,7 +119,7 @@ def test_few_uploads_are_opened_at_once_and_one_of_each_sender(monkeypatch, tmp_
     for one in threads:
         one.join()
     assert max(opened_at_once) <= SETTINGS.openings
-    assert any("Another file of yours" in text for text in refusals)
+    assert any("Another file from your address" in text for text in refusals)
     assert any("files of others" in text for text in refusals)
     # On one's own machine two photos that are dropped at once come one after the other.
     shared_quota = quota.Quota(patient=True)

@@ -89,7 +89,7 @@ class Quota:
     @contextmanager
     def opening(self, sender: str) -> Iterator[None]:
         """A place among the few files that are opened at a time. Raises InputError where there is none."""
-        refusal = "Another file of yours is being opened; wait until it is there."
+        refusal = "Another file from your address is being opened; wait until it is there, then send this one again."
         turn = self._patient and self._turn.acquire(timeout=SETTINGS.opening_seconds)
         try:
             with self._place("opening", sender, 1, refusal):
