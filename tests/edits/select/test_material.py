@@ -87,6 +87,16 @@ def test_a_part_goes_whole_with_what_of_it_is_like_the_material(monkeypatch):
     assert (part != (THING & ~LEGS)).mean() < 0.01
 
 
+def test_a_click_on_a_seam_means_what_is_around_it(monkeypatch):
+    colour = albedo(shade=1)
+    seam = np.zeros((H, W), bool)
+    seam[20:40, 59] = True
+    colour[seam] = (0.25, 0.18, 0.1)
+    outlining(monkeypatch, THING & ~LEGS, LEGS, seam)
+    part = of_material(scene(colour), THING, [(59, 30)])
+    assert part[(THING & ~LEGS)].mean() > 0.95
+
+
 def test_the_smallest_outline_around_a_pixel_is_its_part(monkeypatch):
     outlining(monkeypatch, THING, LEGS, SHADE)
     labels = parts_of(scene(), THING, [CLOTH])
