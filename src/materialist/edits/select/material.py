@@ -30,7 +30,7 @@ class SameMaterialSettings:
     part_weight: float = 0.85  # of a part's colour beside a pixel's own
     lightness: float = 3.0  # by which CIE94 divides it: what light is left in the albedo is in L
     threshold: float = 7.0  # CIE94 difference
-    seed_radius: float = 0.02  # of what is of the material around a click in no part
+    seed_radius: float = 0.02  # of what is of the material around a click
     hole: float = 0.02  # share of the material, of holes that stay
     crumb: float = 0.003  # the same, of pieces that go
     kept: float = 0.004  # radius around a click of what stays in any case
