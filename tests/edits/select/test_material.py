@@ -17,8 +17,8 @@ def outlining(monkeypatch, *parts, expected=0.95):
     def masks(rgb, clicks):
         ((x, y),) = clicks
         there = sorted((part for part in parts if part[y, x]), key=np.sum)
-        found = there[0] if there else np.zeros((H, W), bool)
-        return np.where(found, 1.0, -1.0)[None], np.array([expected if there else 0.0])
+        outline = there[0] if there else np.zeros((H, W), bool)
+        return np.where(outline, 1.0, -1.0)[None], np.array([expected if there else 0.0])
 
     monkeypatch.setattr(sam, "masks", masks)
 
