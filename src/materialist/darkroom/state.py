@@ -206,10 +206,11 @@ def native_jpeg(desk: Desk, longest: int = SHOWN_SIDE, quality: int = 93) -> byt
     """The open photo at its own resolution, up to `longest` pixels a side, as a JPEG: made once."""
     live = desk.session.preview
     with _ENCODING:
-        if longest not in live.photos:
+        key = (longest, quality)
+        if key not in live.photos:
             photo = display.shrunk(live.scene.photo.original, longest)
-            live.photos[longest] = display.encoded(srgb_levels(photo), "JPEG", quality=quality)
-        return live.photos[longest]
+            live.photos[key] = display.encoded(srgb_levels(photo), "JPEG", quality=quality)
+        return live.photos[key]
 
 
 def working_jpeg(desk: Desk) -> bytes:

@@ -65,8 +65,8 @@ class Live:
         self._asked = time.monotonic()
         self._fallen: set[str] = set()
         """Lists of edits that end with a fall, which was simulated."""
-        self.photos: dict[int, bytes] = {}
-        """The photo as a JPEG of at most so many pixels a side."""
+        self.photos: dict[tuple[int, int], bytes] = {}
+        """The photo as a JPEG, by the most pixels a side and the quality."""
         with self._lock:
             self._start(worker)
         try:
