@@ -94,7 +94,7 @@ class Material {
   draw(options: Options, out: Uint8ClampedArray): void {
     const { header, arrays } = this.block;
     const { diffuse, specular, base, photo, colour, albedo, roughness, metallic, weight } = arrays as Record<string, Numbers>;
-    const { gain, lit, added, fitted_metallic: fitted } = arrays as Record<string, Numbers>;
+    const { gain, lit, added, shade: shades, fitted_metallic: fitted } = arrays as Record<string, Numbers>;
     const { gloss, paint_shade: paintShade, metal_shade: metalShade } = arrays as Record<string, Numbers>;
     const limits = header.shade_limits as number[];
     const at = arrays.at as Uint32Array;
@@ -141,6 +141,7 @@ class Material {
       const first = 6 * (low * count + i);
       const second = first + 6 * count;
       const left = Math.min(Math.max(1 - m, 1e-3) / Math.max(1 - fitted![i]!, 1e-3), 1);
+      const shaded = 1 + left * (shades![i]! - 1);
       let same = true;
       const place = 4 * at[i]!;
       for (let c = 0; c < 3; c++) {
@@ -152,17 +153,19 @@ class Material {
         // --- In the photo, whose own texture goes on: `edits.composite.into_photo` ---
         const b = base![3 * i + c]!;
         const p = photo![3 * i + c]!;
-        const held = p >= clipped ? Math.max(p, b) : p;
         same &&= Math.abs(edited - b) <= 1e-4 + 2e-3 * b;
         let value: number;
         if (overall) {
+          const held = p >= clipped ? Math.max(p, b) : p;
           const [before, after] = [Math.max(b, 0), Math.max(edited, 0)];
           const dimmed = overall[c]! * held;
           const moved = ((held + floor) * (after + floor)) / (before + floor) - floor;
           value = Math.min(Math.max(moved, Math.min(dimmed, after)), Math.max(dimmed, after));
         } else {
           const factor = Math.min((edited + floor) / (b + floor), 1) * left;
-          value = Math.max(edited + factor * (held - b), 0);
+          const reference = shaded * b;
+          const held = p >= clipped ? Math.max(p, reference) : p;
+          value = Math.max(shaded * edited + factor * (held - reference), 0);
         }
         if (gain) value = value * gain[3 * i + c]! + a * (1 - m) * lit![3 * i + c]! + added![3 * i + c]!;
         out[place + c] = level(value);

@@ -205,9 +205,9 @@ class Preview:
         changed = changed_pixels(self.scene, edited) & differs
         relit = is_relit(self.scene, edited)
         left = diffuse_left(self.scene, edited)
-        return onto_working(
-            self.scene.photo, Layers(base, picture, differs, changed, relit, diffuse=left)
-        )
+        albedo = self.scene.materials.albedo
+        layers = Layers(base, picture, differs, changed, relit, diffuse=left, albedo=albedo)
+        return onto_working(self.scene.photo, layers)
 
     def _seen(self, edited: Scene) -> Scene:
         """The scene as it is shaded: in-photo emitters are not shown, and their light comes from the map, as fitted."""

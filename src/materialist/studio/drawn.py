@@ -16,6 +16,7 @@ import numpy as np
 from materialist.bsdf.disney import DIELECTRIC_R0
 from materialist.color import srgb_levels
 from materialist.edits.composite.into_photo import SETTINGS as COMPOSITE
+from materialist.edits.composite.into_photo import missing_shade
 from materialist.edits.core.operation import REGION
 from materialist.edits.insert.operation import INSERT
 from materialist.edits.light.relight import SETTINGS as LAMPS
@@ -210,6 +211,9 @@ def _material(live: LivePreview, drawing: Drawing) -> Made:
         "metal_shade": shades[1],
     }
     over = _over(live, drawing, rest)
+    fitted_albedo = live.scene.materials.albedo.reshape(-1, 3)[pixels]
+    seen = live.scene.photo.linear.reshape(-1, 3)[pixels]
+    rows["shade"] = missing_shade(seen, rows["base"], fitted_albedo)
     rows |= {
         name: values.reshape(inside.size, -1)[pixels] for name, values in (maps | over).items()
     }

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from materialist.color import white_share
 from materialist.edits.composite.border import SETTINGS as BORDER
 from materialist.edits.composite.glare import add_glare
 from materialist.edits.composite.glow import light_share
@@ -24,6 +25,9 @@ class CompositeSettings:
     """How the photo's residual over the fit follows an edit; tuned by eye unless derived."""
 
     floor: float = 0.02  # radiance added to edited and base: ratios of dark pixels count less
+    black: float = (
+        0.005  # radiance added to diffuse light, and least albedo: ratios of black are noise
+    )
     max_detail_factor: float = 2.0  # on the photo's finest detail, under another light
     mixed_pixels: int = 1  # working pixels inside of a border whose maps may mix both sides
     clipped_photo: float = 0.995  # channel of a linear photo that is clipped; derived: 8 bits
@@ -224,16 +228,36 @@ def _terms(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
 
 
 def _same_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
-    """out = edited + factor (photo - base).
+    """out = q edited + factor (photo - q base).
 
-    The residual of the photo over the fit is mostly texture that the albedo lacks: it dims as the surface does,
-    factor = edited / base, and does not grow (a ratio above 1 is taken as 1). New metal hides it.
+    Shadows and gaps that the fit lacks darken both renderings, by q of `missing_shade`, where the edit replaces the
+    surface. The rest of the photo's residual is mostly texture and gloss that the albedo lacks: it dims as the surface
+    does, factor = edited / base, and does not grow (a ratio above 1 is taken as 1). New metal hides both.
     """
+    left = 1.0 if layers.diffuse is None else layers.diffuse[..., None]
     # A brighter surface does not amplify what the fit misses of the photo.
-    factor = np.minimum((layers.edited + SETTINGS.floor) / (layers.base + SETTINGS.floor), 1)
-    if layers.diffuse is not None:
-        factor = factor * layers.diffuse[..., None]
-    return layers.edited - layers.base, factor - 1, layers.base
+    factor = left * np.minimum((layers.edited + SETTINGS.floor) / (layers.base + SETTINGS.floor), 1)
+    if layers.albedo is None:
+        return layers.edited - layers.base, factor - 1, layers.base
+    shade = missing_shade(photo.linear, layers.base, layers.albedo)
+    shade = np.where(layers.changed, shade, 1)[..., None]
+    shade = 1 + left * (shade - 1)
+    return shade * (layers.edited - layers.base), factor - 1, shade * layers.base
+
+
+def missing_shade(photo: Array, base: Array, albedo: Array) -> Array:
+    """[...] q in [0, 1]: the photo's diffuse light over that of the fit's rendering, both [..., 3] linear.
+
+    Diffuse light has the colour of the albedo [..., 3]. A highlight that one of them has and the other lacks is white:
+    it is left out, or it would be taken for light, or its lack for shade.
+    """
+    paint = np.maximum(albedo, SETTINGS.black)
+    paint = paint / np.linalg.norm(paint, axis=-1, keepdims=True)
+    parts = []
+    for light in (photo, base):
+        diffuse = light - white_share(light, paint)[..., None]
+        parts.append(np.maximum((diffuse * paint).sum(-1), 0) + SETTINGS.black)
+    return np.minimum(parts[0] / parts[1], 1)
 
 
 def _other_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:

@@ -69,6 +69,8 @@ class Layers:
     """New bodies at native size, which stand before all this; under them the maps above go on from what is beside."""
     diffuse: Array | None = None
     """[H, W] in [0, 1]: what new metal leaves of the diffuse light, in which the photo's own texture is; None: all."""
+    albedo: Array | None = None
+    """[H, W, 3] of the fitted scene, by whose colour diffuse light is told from mirrored light; None: not known."""
     covered: Array | None = None
     """[H, W] bool: bodies that only one scene has and `native` has not: the rendering alone is seen; in `changed`."""
 
@@ -114,7 +116,12 @@ def render_layers(renderer: EditRenderer, edited: Scene, options: RenderOptions)
         rendered = settled([layers.base, layers.edited], scene.depth, scene.photo.linear)
         layers = replace(layers, base=rendered[0], edited=rendered[1])
     return replace(
-        layers, relit=relit, native=alone, covered=covered, diffuse=diffuse_left(scene, edited)
+        layers,
+        relit=relit,
+        native=alone,
+        covered=covered,
+        diffuse=diffuse_left(scene, edited),
+        albedo=scene.materials.albedo,
     )
 
 
