@@ -57,3 +57,17 @@ def test_a_library_cannot_swallow_ctrl_c_while_it_is_imported(
     assert run_to_exit_code(app, []) == 130
     assert "nothing was written" in capsys.readouterr().err
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_ctrl_c_that_a_renderer_reports_as_its_own_error_is_no_bug(capsys):
+    app = typer.Typer()
+
+    @app.command()
+    def go() -> None:
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as stop:
+            raise RuntimeError("error while performing a custom operation") from stop
+
+    assert run_to_exit_code(app, []) == 130
+    assert "bug" not in capsys.readouterr().err

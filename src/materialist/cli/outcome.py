@@ -42,7 +42,7 @@ def run_to_exit_code(app: typer.Typer, arguments: Sequence[str]) -> int:
     """Run the command line and return the exit code; no exception leaves except SystemExit of a signal."""
     wants_json = "--json" in arguments
     try:
-        with _tidy_when_terminated(), _interrupted_between_imports():
+        with _tidy_when_terminated(), _interrupted_between_imports(), _unwrapped():
             result = app(args=list(arguments), standalone_mode=False, prog_name="materialist")
         if result == INTERRUPTED:  # how some versions of typer report Ctrl-C
             raise KeyboardInterrupt
@@ -115,6 +115,20 @@ def _tidy_when_terminated() -> Iterator[None]:
     finally:
         if signal.getsignal(signal.SIGTERM) is stop:
             signal.signal(signal.SIGTERM, signal.SIG_DFL)
+
+
+@contextmanager
+def _unwrapped() -> Iterator[None]:
+    """Within it a stop that reached Python inside a renderer, which reports it as an error of its own, is one again."""
+    try:
+        yield
+    except Exception as error:
+        cause = error.__cause__
+        while cause is not None:
+            if isinstance(cause, (_Terminated, KeyboardInterrupt)):
+                raise cause from None
+            cause = cause.__cause__
+        raise
 
 
 @contextmanager

@@ -21,7 +21,7 @@ from materialist.edits.composite.composite import (
     pictures,
     spent_composite,
 )
-from materialist.edits.composite.into_photo import SETTINGS, into_photo
+from materialist.edits.composite.into_photo import SETTINGS, into_photo, onto_working
 from materialist.edits.composite.layers import Layers, _gain, significance, without_fireflies
 from materialist.edits.composite.matte import matte
 from materialist.edits.composite.native_layer import NativeLayer
@@ -116,6 +116,32 @@ def test_texture_beyond_the_fit_dims_with_the_surface():
         out[inner], (0.2 + factor * 0.5 * (grain - 1))[inner].repeat(3, -1), atol=0.02
     )
     np.testing.assert_array_equal(out[~MASK][:100], photo.original[~MASK][:100])
+
+
+def test_a_shade_that_the_fit_lacks_stays_and_a_highlight_is_none():
+    """Green paint is made brighter red. The photo has a shade, and neither its highlight nor the fit's is one."""
+    green = np.array([0.1, 0.4, 0.15], np.float32)
+    red = np.array([0.8, 0.2, 0.15], np.float32)
+    gloss = np.float32(0.3)
+    base = np.tile(green, (1, 4, 1))
+    photo = base * np.array([1, 0.25, 1, 1], np.float32)[:, None]
+    edited = np.tile(red, (1, 4, 1))
+    photo[:, 2] += gloss
+    base[:, 3] += gloss
+    edited[:, 3] += gloss
+    everywhere = np.ones((1, 4), bool)
+    layers = Layers(base, edited, everywhere, everywhere, albedo=np.tile(green, (1, 4, 1)))
+    seen = replace(FLAT.photo, linear=photo, original=photo)
+    out = onto_working(seen, layers)
+    np.testing.assert_allclose(out[0, 0], red, atol=1e-6)
+    np.testing.assert_allclose(out[0, 1], 0.25 * red, rtol=0.1)
+    additive = onto_working(seen, replace(layers, albedo=None))
+    assert (additive[0, 1] > 2 * 0.25 * red)[0]
+    np.testing.assert_allclose(out[0, 2:], additive[0, 2:], rtol=0.1)
+    # Where the surface is the photo's own, the light of an edit is added to it as it is.
+    passed_on = replace(layers, edited=base + 0.1, changed=~everywhere)
+    out = onto_working(seen, passed_on)
+    np.testing.assert_allclose(out, photo + 0.1, atol=1e-6)
 
 
 def test_no_fringe_of_the_old_colour_is_left_at_a_border():
