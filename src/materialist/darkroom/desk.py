@@ -176,10 +176,10 @@ class Desk:
 
     # The pointer
 
-    def pointed(self, x: float, y: float, *, compute: bool = True) -> Array | None:
-        """[H, W] bool of the object that a click at a pixel takes, or None; remembered for that click.
+    def pointed(self, x: float, y: float) -> Array:
+        """[H, W] bool of the object that a click at a pixel takes, but for its sharper border; remembered.
 
-        compute: False gives only what is remembered. Raises InputError where a click would.
+        Raises InputError where a click would.
         """
         scene = self.session.scene
         place = self.session.pixel(x, y)
@@ -187,12 +187,12 @@ class Desk:
             if scene is not self._scene:
                 self._pointed.clear()
                 self._scene = scene
-            if place not in self._pointed and compute:
+            if place not in self._pointed:
                 # While one is being found, the next pointer waits: a page asks for one at a time.
-                self._pointed[place] = self.session.preview.select(click=place)
+                self._pointed[place] = self.session.preview.select(click=place, sharpen=False)
                 while len(self._pointed) > POINTED:
                     self._pointed.popitem(last=False)
-            return self._pointed.get(place)
+            return self._pointed[place]
 
 
 class Desks:

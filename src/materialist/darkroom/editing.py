@@ -33,11 +33,7 @@ def pick(desk: Desk, body: bodies.Pick) -> State:
         if index is not None:
             desk.session.act("choose", index)
             return state(desk)
-    known = None
-    # What the page outlined under the pointer is what the click takes.
-    if body.tool == "click":
-        known = desk.pointed(*body.at, compute=body.mode != "remove")
-    desk.session.pick(**body.model_dump(), region=known)
+    desk.session.pick(**body.model_dump())
     return state(desk)
 
 

@@ -59,12 +59,8 @@ class Selection:
         y: float,
         mode: str,
         choose: Choose,
-        region: Array | None = None,
     ) -> Selection:
-        """With the object at a pixel: alone, or added. What is selected there already is taken away, unless added.
-
-        region: [H, W] bool of that object, where it is known already.
-        """
+        """With the object at a pixel: alone, or added. What is selected there already is taken away, unless added."""
         height, width = scene.depth.shape
         # The right and bottom edge belong to the last pixel.
         row = min(int(y), height - 1)
@@ -75,8 +71,7 @@ class Selection:
         # A second click on a selected object takes it out.
         if inside and mode != ADD:
             return Selection(tuple(part for part in self.parts if not part[row, column]))
-        if region is None:
-            region = choose(click=(x, y))
+        region = choose(click=(x, y))
         return replace(self._with(region, mode), clicked=(column, row))
 
     def resized(self, larger: bool, choose: Choose) -> Selection:

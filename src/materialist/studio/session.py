@@ -194,19 +194,15 @@ class Session:
         at: Sequence[float] = (),
         points: Sequence[Sequence[float]] = (),
         radius: float = 1.0,
-        region: Array | None = None,
     ) -> None:
-        """A click or a box at two or four numbers, or a brush stroke through points. Raises InputError.
-
-        region: [H, W] bool of the object at a click, where it is known already.
-        """
+        """A click or a box at two or four numbers, or a brush stroke through points. Raises InputError."""
         with self.lock:
             scene = self.scene
             choose = self.preview.select
             before = self.selection
             if tool == "click":
                 x, y = self.pixel(*at)
-                after = before.click(scene, x, y, mode, choose, region)
+                after = before.click(scene, x, y, mode, choose)
             elif tool == "box":
                 after = before.box(scene, at, mode, choose)
             else:

@@ -15,7 +15,7 @@ from materialist.predict.bundled.edges import grabcut
 from materialist.predict.clicks import segment
 from materialist.predict.clicks.features import Box
 from materialist.predict.sam import masks as sam
-from materialist.types import Array, Scene
+from materialist.types import Array, Photo, Scene
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,11 @@ class SelectSettings:
 
     min_held: float = 0.8  # of a click's mask, by the mask of its box that replaces it
 
+    # The second look, at the object alone.
+    margin: float = 0.2  # around its box, in longer sides of the box
+    min_enlargement: float = 1.25  # what fills the photo is not seen better; derived
+    min_agreement: float = 0.8  # IoU with the first mask; less: another object
+
     clicknet_weight: float = (
         0.5  # of ClickNet beside MobileSAM; 0.25 to 2 score alike on 222 made things
     )
@@ -50,19 +55,21 @@ def object_at_points(
     *,
     network: bool = True,
     extent: str = "auto",
+    sharpen: bool = True,
 ) -> Array:
     """[H, W] bool of the object that all (column, row) points lie on: it holds them all.
 
-    extent: one of `EXTENTS`, of the network's masks.
+    extent: one of `EXTENTS`, of the network's masks. sharpen: whether the network looks at it twice.
     Raises InputError where the network finds no such object, or where most of the photo is the smallest one.
     """
     if network:
-        mask = tidy(_together(scene, points, extent), points)
-        return tidy(_whole(scene, mask, points), points)
+        outline = _whole(scene, _together(scene, points, extent), points)
+        outline = _sharpened(scene, outline, points) if sharpen else outline
+        return tidy(outline > 0, points)
     return tidy(grabcut(scene.photo.linear, _around(scene, points)), points)
 
 
-def object_in(scene: Scene, box: Box, *, network: bool = True) -> Array:
+def object_in(scene: Scene, box: Box, *, network: bool = True, sharpen: bool = True) -> Array:
     """[H, W] bool of the object in a box, which may be small in it (`box_overlap`) or empty.
 
     GrabCut takes for the object what is not seen outside of the box: a tight box suits it.
@@ -70,7 +77,9 @@ def object_in(scene: Scene, box: Box, *, network: bool = True) -> Array:
     inside = np.zeros(scene.depth.shape, np.uint8)
     inside[box[1] : box[3], box[0] : box[2]] = 1
     if network:
-        return tidy(_outlined(scene, box) & (inside > 0), ())
+        outline = _outlined(scene, box)
+        outline = _sharpened(scene, outline) if sharpen else outline
+        return tidy((outline > 0) & (inside > 0), ())
     return tidy(grabcut(scene.photo.linear, inside * np.uint8(cv2.GC_PR_FGD)), ())
 
 
@@ -96,21 +105,21 @@ def _around(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
 
 
 def _together(scene: Scene, points: Sequence[tuple[int, int]], extent: str) -> Array:
-    """[H, W] bool: the mask at all points. Raises InputError where one off the object makes it most of the photo."""
-    mask = _at(scene, points, extent)
-    share = mask.mean()
+    """[H, W] logits of the mask at all points. Raises InputError where one off it makes it most of the photo."""
+    outline = _at(scene, points, extent)
+    share = (outline > 0).mean()
     if len(points) > 1 and extent == "auto" and share > SETTINGS.most:
-        largest = max(_at(scene, [point]).mean() for point in points)
+        largest = max((_at(scene, [point]) > 0).mean() for point in points)
         if largest < share / 2:
             raise InputError(
                 f"The clicks select {share:.0%} of the photo together, and each alone at most {largest:.0%}: one of "
                 "them is off the object. Leave it out; where so much is meant, give a box or a mask."
             )
-    return mask
+    return outline
 
 
 def _at(scene: Scene, points: Sequence[tuple[int, int]], extent: str = "auto") -> Array:
-    """[H, W] bool: of MobileSAM's masks that hold all points (column, row), the one that is meant.
+    """[H, W] logits: of MobileSAM's masks that hold all points (column, row), the one that is meant.
 
     MobileSAM outlines parts and wholes well and guesses badly which of them is meant; ClickNet, which also sees normals
     and depth, outlines badly and guesses better.
@@ -125,7 +134,7 @@ def _at(scene: Scene, points: Sequence[tuple[int, int]], extent: str = "auto") -
             f"No object is found that holds the click at {places}; click another place on it, or give a box or a mask."
         )
     if extent != "auto":
-        by_size = sorted(logits[holding] > 0, key=np.sum)
+        by_size = sorted(logits[holding], key=lambda one: (one > 0).sum())
         place = {"small": 0, "medium": len(by_size) // 2, "large": -1}
         return np.asarray(by_size[place[extent]])
     # Each mask by its expected IoU, and by how well it agrees with ClickNet.
@@ -134,25 +143,68 @@ def _at(scene: Scene, points: Sequence[tuple[int, int]], extent: str = "auto") -
         score + SETTINGS.clicknet_weight * _soft_overlap(likely, mask > 0)
         for mask, score in zip(logits, expected, strict=True)
     ]
-    return np.asarray(logits[int(np.argmax(np.where(holding, marks, -np.inf)))] > 0)
+    return np.asarray(logits[int(np.argmax(np.where(holding, marks, -np.inf)))])
 
 
-def _whole(scene: Scene, mask: Array, points: Sequence[tuple[int, int]]) -> Array:
-    """[H, W] bool: what MobileSAM outlines in the bounding box of a mask, where that holds the mask and the points.
+def _whole(scene: Scene, outline: Array, points: Sequence[tuple[int, int]]) -> Array:
+    """[H, W] logits: what MobileSAM outlines in the box of an outline, where that holds the outline and the points.
 
     In a box it outlines legs, rims and covers that it leaves out at a click.
     """
+    mask = tidy(outline > 0, points)
     rows, columns = window(mask)
-    box = (columns.start, rows.start, columns.stop, rows.stop)
-    whole = _outlined(scene, box)
-    holds = (whole & mask).sum() >= SETTINGS.min_held * mask.sum()
-    return whole if holds and all(whole[y, x] for x, y in points) else mask
+    whole = _outlined(scene, (columns.start, rows.start, columns.stop, rows.stop))
+    holds = (whole[mask] > 0).sum() >= SETTINGS.min_held * mask.sum()
+    return whole if holds and all(whole[y, x] > 0 for x, y in points) else outline
 
 
 def _outlined(scene: Scene, box: Box) -> Array:
-    """[H, W] bool: what MobileSAM thinks most of, in a box."""
+    """[H, W] logits: what MobileSAM thinks most of, in a box."""
     logits, expected = sam.masks(linear_to_srgb(scene.photo.linear), box=box)
-    return np.asarray(logits[int(np.argmax(expected))] > 0)
+    return np.asarray(logits[int(np.argmax(expected))])
+
+
+def _sharpened(scene: Scene, outline: Array, points: Sequence[tuple[int, int]] = ()) -> Array:
+    """[H, W] logits of an object, to which those of a second look at it are added: at what is around it alone.
+
+    MobileSAM's masks have 256 pixels along the longer side, whatever it looks at.
+    """
+    mask = tidy(outline > 0, points)
+    if not mask.any():
+        return outline
+    # --- What is around the object, at the photo's own resolution ---
+    rows, columns = window(mask)
+    margin = round(SETTINGS.margin * max(rows.stop - rows.start, columns.stop - columns.start))
+    around = window(mask, margin=margin)
+    shape = mask[around].shape
+    if SETTINGS.min_enlargement * max(shape) > max(mask.shape):
+        return outline
+    picture = _native(scene.photo, mask, margin)
+    # --- MobileSAM's mask there that is the same object ---
+    across = picture.shape[1] / shape[1]
+    down = picture.shape[0] / shape[0]
+    left, right = (across * (x - around[1].start) for x in (columns.start, columns.stop))
+    top, bottom = (down * (y - around[0].start) for y in (rows.start, rows.stop))
+    logits, _ = sam.masks(picture, box=(round(left), round(top), round(right), round(bottom)))
+    looks = [cv2.resize(one, shape[::-1], interpolation=cv2.INTER_AREA) for one in logits]
+    agreement = [overlap(look > 0, mask[around]) for look in looks]
+    best = int(np.argmax(agreement))
+    if agreement[best] < SETTINGS.min_agreement:
+        return outline
+    sharpened = outline.copy()
+    sharpened[around] += looks[best]
+    return sharpened
+
+
+def _native(photo: Photo, mask: Array, margin: int) -> Array:
+    """[h, w, 3] sRGB in [0, 1] around a mask [H, W] bool, at the photo's resolution or the one that MobileSAM sees."""
+    picture = photo.original[window(mask, photo.original.shape[:2], margin)]
+    height, width = picture.shape[:2]
+    scale = sam.SIDE / max(height, width)
+    if scale < 1:
+        size = (max(1, round(scale * width)), max(1, round(scale * height)))
+        picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
+    return linear_to_srgb(picture)
 
 
 def _soft_overlap(likely: Array, mask: Array) -> float:

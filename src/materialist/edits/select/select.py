@@ -46,6 +46,7 @@ def select(
     extent: str = "auto",
     same_material: bool = False,
     exclude: Sequence[float] | Sequence[Sequence[float]] | None = None,
+    sharpen: bool = True,
     device: str = "auto",
 ) -> Array:
     """[H, W] bool mask at working size of the object at a click, in a box, or the given mask, checked.
@@ -58,6 +59,8 @@ def select(
         same_material: of the object at the clicks only what has the material of one of them: cloth without legs. It
             goes by colour: grey paint and grey glass are alike.
         exclude: (x, y), or several, of what is taken away again: the smallest part there, or what is of one colour.
+        sharpen: look at the object that the network finds once more, at it alone, which takes a second: its border is
+            sharper.
         method: `network` (MobileSAM and ClickNet) or `grabcut` (by colours alone); `sam2` is `network`.
         device: of no effect; both run on the processor.
 
@@ -90,9 +93,9 @@ def select(
     if frame is not None:
         if method == "grabcut":
             _check_background(scene, frame)
-        region = object_in(scene, frame, network=network)
+        region = object_in(scene, frame, network=network, sharpen=sharpen)
     else:
-        region = object_at_points(scene, points, network=network, extent=extent)
+        region = object_at_points(scene, points, network=network, extent=extent, sharpen=sharpen)
     # --- Refused where it is empty, or does not fit the box ---
     region = region & (scene.depth > 0)
     if not region.any():

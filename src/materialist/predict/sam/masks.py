@@ -30,8 +30,8 @@ DEVIATION = np.array([58.395, 57.12, 57.375], np.float32) / 255
 """Of sRGB-encoded values in [0, 1], as the encoder was trained."""
 NOTHING, POINT, FIRST_CORNER, SECOND_CORNER = -1, 1, 2, 3
 """SAM's labels of the places in a prompt."""
-REMEMBERED = 2
-"""Photos whose embeddings are kept: encoding takes seconds, decoding a tenth of one."""
+REMEMBERED = 4
+"""Pictures whose embeddings are kept: encoding takes a second, decoding a tenth of one."""
 
 _embeddings: OrderedDict[bytes, Array] = OrderedDict()
 _LOCK = threading.Lock()
