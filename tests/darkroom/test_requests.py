@@ -60,7 +60,11 @@ def test_the_selection_of_a_click_grows_and_its_edit_with_it(client, monkeypatch
     grown = block().copy()
     grown[:, :20] = True
     extents = {"auto": block(), "small": block(), "medium": block(), "large": grown}
-    monkeypatch.setattr(session.live, "select", lambda click, extent="auto": extents[extent].copy())
+
+    def choose(click, extent="auto", sharpen=True):
+        return extents[extent].copy()
+
+    monkeypatch.setattr(session.live, "select", choose)
     assert select_block(client)["stage"]["clicked"]
     change(client, hue=120)
     before = client.get("/api/state").json()

@@ -57,7 +57,7 @@ def test_a_click_takes_less_or_more():
     scene = room()
     sizes = {"auto": 12, "small": 6, "medium": 12, "large": 20}
 
-    def choose(click, extent="auto"):
+    def choose(click, extent="auto", sharpen=True):
         region = np.zeros((48, 64), bool)
         x, y = click
         region[y - 4 : y + 4, x : x + sizes[extent]] = True

@@ -197,7 +197,7 @@ def test_a_selection_that_its_edit_follows_is_kept_for_the_next_start(session, m
     before = session.selection.mask
     grown = before.copy()
     grown[:, :20] = True
-    monkeypatch.setattr(session.live, "select", lambda click, extent: grown.copy())
+    monkeypatch.setattr(session.live, "select", lambda click, extent, sharpen=True: grown.copy())
     session.reselect(lambda selection: selection.resized(True, session.preview.select))
     history = read_history(session.workspace, session.scene.depth.shape)
     np.testing.assert_array_equal(history.selection.mask, grown)

@@ -23,7 +23,7 @@ from materialist.studio.history import History, read_history, write_history
 from materialist.studio.live import Live
 from materialist.studio.selection import ADD, REMOVE, Selection
 from materialist.studio.workspace import Project, content_of, located, read_steps, write_mask
-from materialist.types import Array, Scene
+from materialist.types import Scene
 
 EDITS = "edits.yaml"
 ENDING = ("take", "removal")

@@ -48,7 +48,7 @@ def test_select_narrows_what_it_found(monkeypatch):
     made = scene()
     asked = []
 
-    def objects(scene, points, *, extent="auto", network=True):
+    def objects(scene, points, *, extent="auto", network=True, sharpen=True):
         return THING
 
     def part_at(scene, mask, point):
@@ -78,7 +78,7 @@ def test_select_narrows_what_it_found(monkeypatch):
 
 
 def test_grabcut_goes_by_colour_alone(monkeypatch):
-    def objects(scene, points, *, extent="auto", network):
+    def objects(scene, points, *, extent="auto", network, sharpen):
         assert not network
         return THING
 

@@ -1,5 +1,8 @@
 """Masks of known shapes, and what cannot be selected."""
 
+from dataclasses import replace
+
+import cv2
 import numpy as np
 import pytest
 from edit_scenes import scene_of
@@ -10,6 +13,7 @@ from materialist.edits.select import select as selecting
 from materialist.edits.select.objects import overlap
 from materialist.edits.select.select import select
 from materialist.errors import InputError
+from materialist.geometry.silhouette import window
 from materialist.types import Camera
 
 
@@ -81,7 +85,7 @@ def test_an_extent_is_one_of_the_masks_by_size(table, monkeypatch):
 
     monkeypatch.setattr(objects.sam, "masks", answers)
     for extent, mask in sizes.items():
-        selected = select(scene, click=(50, 50), extent=extent)
+        selected = select(scene, click=(50, 50), extent=extent, sharpen=False)
         # What does not touch the clicked thing is left out, as ever.
         assert overlap(selected, first if extent == "large" else mask) > 0.95, extent
 
@@ -118,11 +122,85 @@ def test_a_click_takes_what_is_outlined_in_the_box_of_its_mask(table, monkeypatc
 
     monkeypatch.setattr(objects.sam, "masks", masks)
     y, x = (int(v) for v in np.argwhere(seat)[len(np.argwhere(seat)) // 3])
-    selected = select(scene, click=(x, y))
+    selected = select(scene, click=(x, y), sharpen=False)
     expected = first if legs_in_box else seat
     assert objects.overlap(selected, expected) > 0.95
     held = np.argwhere(objects.tidy(seat, [(x, y)]))
     assert boxes[-1] == (*held.min(0)[::-1], *(held.max(0)[::-1] + 1))
+
+
+@pytest.fixture(scope="module")
+def far():
+    """A star that is small in a large photo, and its mask."""
+    h, w, native = 300, 400, 4
+    rng = np.random.default_rng(1)
+    y, x = np.mgrid[: h * native, : w * native] / native
+    radius = 22 + 8 * np.cos(5 * np.arctan2(y - 100, x - 260))
+    star = np.hypot(y - 100, x - 260) < radius
+    original = np.where(star[..., None], [0.6, 0.1, 0.05], [0.3, 0.35, 0.3])
+    original = (original * rng.uniform(0.9, 1.1, star.shape)[..., None]).astype(np.float32)
+    blocks = (h, native, w, native)
+    photo = original.reshape(*blocks, 3).mean((1, 3)).astype(np.float32)
+    normal = np.broadcast_to([0, 0, 1], (h, w, 3))
+    scene = scene_of(
+        Camera(w, h, 40.0),
+        np.full((h, w), 2, np.float32),
+        normal,
+        photo,
+        photo=photo,
+        completion="none",
+    )
+    scene = replace(scene, photo=replace(scene.photo, original=original))
+    return scene, star.reshape(blocks).mean((1, 3)) > 0.5
+
+
+@pytest.mark.parametrize("prompt", [{"click": (260, 100)}, {"box": (225, 65, 295, 135)}])
+def test_a_second_look_sharpens_the_border(far, prompt):
+    scene, star = far
+    once = select(scene, **prompt, sharpen=False)
+    twice = select(scene, **prompt)
+    assert (twice ^ star).sum() < 0.7 * (once ^ star).sum()
+    assert overlap(twice, star) > 0.95
+
+
+@pytest.mark.parametrize(("reach", "same"), [(1, True), (12, False)])
+def test_a_second_look_at_something_else_does_not_count(far, monkeypatch, reach, same):
+    scene, star = far
+    first = np.where(star, 1, -1).astype(np.float32)
+    seen = []
+
+    def masks(rgb, points=(), box=None):
+        if rgb.shape[:2] == star.shape:
+            return first[None].repeat(3, 0), np.ones(3)
+        seen.append((rgb.shape[:2], box))
+        within = cv2.resize(first, (4 * 400, 4 * 300))[top:, left:][: rgb.shape[0], : rgb.shape[1]]
+        other = np.where(cv2.dilate(within, np.ones((1 + 8 * reach, 1 + 8 * reach))) > 0, 9, -9)
+        return other[None].repeat(3, 0).astype(np.float32), np.ones(3)
+
+    rows, columns = window(objects.tidy(star, ()))
+    margin = round(0.2 * max(rows.stop - rows.start, columns.stop - columns.start))
+    top = 4 * (rows.start - margin)
+    left = 4 * (columns.start - margin)
+    monkeypatch.setattr(objects.sam, "masks", masks)
+    selected = select(scene, box=(225, 65, 295, 135))
+    (shape, box) = seen[0]
+    assert shape == (
+        4 * (rows.stop - rows.start + 2 * margin),
+        4 * (columns.stop - columns.start + 2 * margin),
+    )
+    assert box[:2] == (4 * margin, 4 * margin)
+    assert (selected.sum() > 1.05 * star.sum()) == same
+
+
+def test_what_fills_the_photo_is_looked_at_once(table, monkeypatch):
+    scene, *_ = table
+    everything = np.ones((3, *scene.depth.shape), np.float32)
+    looks = []
+    monkeypatch.setattr(
+        objects.sam, "masks", lambda *_, **__: looks.append(1) or (everything, np.ones(3))
+    )
+    select(scene, box=(2, 2, 158, 118))
+    assert len(looks) == 1
 
 
 def test_a_line_that_is_clicked_stays(table):

@@ -2,8 +2,6 @@
 
 from collections.abc import Callable
 
-import numpy as np
-
 from materialist.edits.select.objects import EXTENTS
 from materialist.types import Array
 
