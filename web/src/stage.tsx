@@ -218,8 +218,11 @@ export function Stage() {
     } else {
       // Where something was edited the very place counts: an edited thing may lie within what is outlined.
       const place = (on.length ? null : pointing.place(first)) ?? first;
-      pointing.out();
-      void change("pick", { tool: "click", mode, at: place }, "", t.selecting).then(follow);
+      void change("pick", { tool: "click", mode, at: place }, "", t.selecting).then(() => {
+        // The outline under the pointer stays until the sharper one takes its place, a second later.
+        pointing.out();
+        follow();
+      });
     }
   };
 
