@@ -8,9 +8,6 @@ ROWS = 256
 """Rows of a picture encoded at a time: bounds the memory."""
 CLIPPED = 0.99
 """Linear value from which a channel of an ordinary photo counts as clipped: the true radiance may be higher."""
-WHITE_RIDGE = 0.03
-"""Added to the square of white in `white_share`: of grey paint, which has the same direction, none is white; tuned by
-eye."""
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
 
 
@@ -53,19 +50,3 @@ def srgb_levels(linear: Array, dtype: type = np.uint8) -> Array:
 def luminance(linear: Array) -> Array:
     """Rec.709 luminance [...] of linear RGB [..., 3]."""
     return np.asarray(linear, np.float32) @ LUMINANCE
-
-
-def white_share(light: Array, paint: Array) -> Array:
-    """[...] w >= 0 of light [..., 3] = s paint + w white: least squares with a ridge on w.
-
-    The dichromatic model (Shafer 1985): what a surface mirrors has the colour of the light, here white.
-
-    paint: [3] or [..., 3], of any length.
-    """
-    paint = paint / np.linalg.norm(paint, axis=-1, keepdims=True)
-    white = 3**-0.5
-    # The normal equations, along unit vectors.
-    along = white * paint.sum(-1)
-    share = (white * light.sum(-1) - along * (light * paint).sum(-1)) / (1 + WHITE_RIDGE - along**2)
-    # No more than each channel has, or another hue would be white.
-    return np.clip(white * share, 0, np.maximum(light.min(-1), 0))

@@ -94,13 +94,13 @@ class Material {
   draw(options: Options, out: Uint8ClampedArray): void {
     const { header, arrays } = this.block;
     const { diffuse, specular, base, photo, colour, albedo, roughness, metallic, weight } = arrays as Record<string, Numbers>;
-    const { gain, lit, added, shade: shades, fitted_metallic: fitted } = arrays as Record<string, Numbers>;
+    const { gain, lit, added, matt: former, fitted_metallic: fitted } = arrays as Record<string, Numbers>;
     const { gloss, paint_shade: paintShade, metal_shade: metalShade } = arrays as Record<string, Numbers>;
     const limits = header.shade_limits as number[];
     const at = arrays.at as Uint32Array;
     const count = header.count as number;
     const levels = header.levels as number[];
-    const [floor, r0] = [header.floor as number, header.r0 as number];
+    const [floor, black, r0] = [header.floor as number, header.black as number, header.r0 as number];
     const clipped = (header.clipped as number | null) ?? Infinity;
     const overall = header.overall as number[] | null;
     const [turn, sat, val] = ["hue", "saturation", "value"].map((name) => Number(options[name] ?? 0)) as [number, number, number];
@@ -109,6 +109,7 @@ class Material {
     const painted = plain !== null || (header.textured as boolean);
     const [rough, metal] = [setter(options.roughness), setter(options.metallic)];
     const now = [0, 0, 0];
+    const made = [0, 0, 0];
     let [known, low, part] = [NaN, 0, 0];
     for (let i = 0; i < count; i++) {
       const w = weight![i]!;
@@ -141,19 +142,33 @@ class Material {
       const first = 6 * (low * count + i);
       const second = first + 6 * count;
       const left = Math.min(Math.max(1 - m, 1e-3) / Math.max(1 - fitted![i]!, 1e-3), 1);
-      const shaded = 1 + left * (shades![i]! - 1);
+      // --- The edit's radiance, and how much of the fit's diffuse light the photo lacks: `missing_shade` ---
       let same = true;
-      const place = 4 * at[i]!;
+      let [seen, diffused, weights] = [0, 0, 0];
       for (let c = 0; c < 3; c++) {
         const a = now[c]!;
-        const matt = diffuse![9 * i + c]! + r * (diffuse![9 * i + 3 + c]! + r * diffuse![9 * i + 6 + c]!);
+        const light = diffuse![9 * i + c]! + r * (diffuse![9 * i + 3 + c]! + r * diffuse![9 * i + 6 + c]!);
         const s0 = specular![first + c]! + part * (specular![second + c]! - specular![first + c]!);
         const s1 = specular![first + 3 + c]! + part * (specular![second + 3 + c]! - specular![first + 3 + c]!);
-        const edited = a * (1 - m) * matt + (r0 * (1 - m) + m * a) * s0 + s1;
-        // --- In the photo, whose own texture goes on: `edits.composite.into_photo` ---
+        const edited = a * (1 - m) * light + (r0 * (1 - m) + m * a) * s0 + s1;
         const b = base![3 * i + c]!;
         const p = photo![3 * i + c]!;
+        const old = former![3 * i + c]!;
+        const change = Math.abs(a * (1 - m) - old);
         same &&= Math.abs(edited - b) <= 1e-4 + 2e-3 * b;
+        seen += change * Math.max(p >= clipped ? Math.max(p, b) : p, 0);
+        diffused += Math.min(old * Math.abs(edited - b), change * Math.max(b, 0));
+        weights += change;
+        made[c] = edited;
+      }
+      const least = black * weights + 1e-9;
+      const shaded = 1 + left * (Math.min((seen + least) / (diffused + least), 1) - 1);
+      // --- In the photo, whose own texture goes on: `edits.composite.into_photo` ---
+      const place = 4 * at[i]!;
+      for (let c = 0; c < 3; c++) {
+        const edited = made[c]!;
+        const b = base![3 * i + c]!;
+        const p = photo![3 * i + c]!;
         let value: number;
         if (overall) {
           const held = p >= clipped ? Math.max(p, b) : p;
@@ -167,7 +182,7 @@ class Material {
           const held = p >= clipped ? Math.max(p, reference) : p;
           value = Math.max(shaded * edited + factor * (held - reference), 0);
         }
-        if (gain) value = value * gain[3 * i + c]! + a * (1 - m) * lit![3 * i + c]! + added![3 * i + c]!;
+        if (gain) value = value * gain[3 * i + c]! + now[c]! * (1 - m) * lit![3 * i + c]! + added![3 * i + c]!;
         out[place + c] = level(value);
       }
       if (same && !gain && !overall) for (let c = 0; c < 3; c++) out[place + c] = level(photo![3 * i + c]!);

@@ -15,7 +15,7 @@ import numpy as np
 from materialist.buffers import placed
 from materialist.camera import pixel_rays
 from materialist.edits.composite.into_photo import onto_working, overall_factor
-from materialist.edits.composite.layers import Layers, changed_pixels, diffuse_left
+from materialist.edits.composite.layers import Layers, changed_pixels, diffuse_left, matt_albedos
 from materialist.edits.core.renderer import is_relit
 from materialist.edits.core.surfaces import dimmed_emitters
 from materialist.envmap import environment
@@ -205,8 +205,8 @@ class Preview:
         changed = changed_pixels(self.scene, edited) & differs
         relit = is_relit(self.scene, edited)
         left = diffuse_left(self.scene, edited)
-        albedo = self.scene.materials.albedo
-        layers = Layers(base, picture, differs, changed, relit, diffuse=left, albedo=albedo)
+        matt = matt_albedos(self.scene, edited)
+        layers = Layers(base, picture, differs, changed, relit, diffuse=left, matt=matt)
         return onto_working(self.scene.photo, layers)
 
     def _seen(self, edited: Scene) -> Scene:

@@ -16,7 +16,7 @@ import numpy as np
 from materialist.bsdf.disney import DIELECTRIC_R0
 from materialist.color import srgb_levels
 from materialist.edits.composite.into_photo import SETTINGS as COMPOSITE
-from materialist.edits.composite.into_photo import missing_shade
+from materialist.edits.composite.layers import matt_albedos
 from materialist.edits.core.operation import REGION
 from materialist.edits.insert.operation import INSERT
 from materialist.edits.light.relight import SETTINGS as LAMPS
@@ -205,15 +205,13 @@ def _material(live: LivePreview, drawing: Drawing) -> Made:
         "roughness": materials.roughness,
         "metallic": materials.metallic,
         "fitted_metallic": live.scene.materials.metallic,
+        "matt": matt_albedos(live.scene, live.scene)[0],
         "weight": weight,
         "gloss": gloss,
         "paint_shade": shades[0],
         "metal_shade": shades[1],
     }
     over = _over(live, drawing, rest)
-    fitted_albedo = live.scene.materials.albedo.reshape(-1, 3)[pixels]
-    seen = live.scene.photo.linear.reshape(-1, 3)[pixels]
-    rows["shade"] = missing_shade(seen, rows["base"], fitted_albedo)
     rows |= {
         name: values.reshape(inside.size, -1)[pixels] for name, values in (maps | over).items()
     }
@@ -224,6 +222,7 @@ def _material(live: LivePreview, drawing: Drawing) -> Made:
         "levels": ROUGHNESS_LEVELS,
         "r0": DIELECTRIC_R0,
         "floor": COMPOSITE.floor,
+        "black": COMPOSITE.black,
         "textured": texture is not None,
         "shade_limits": [float(np.quantile((texels * shade)[core], UNCLIPPED)) for shade in shades],
         "clipped": None if live.scene.photo.hdr else COMPOSITE.clipped_photo,

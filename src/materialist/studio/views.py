@@ -60,7 +60,7 @@ def look_ahead(live: LivePreview) -> None:
     middle = len(rows) // 2
     # What fails here fails at a click, which says why.
     with suppress(MaterialistError):
-        select(live.scene, click=(int(columns[middle]), int(rows[middle])))
+        select(live.scene, click=(int(columns[middle]), int(rows[middle])), sharpen=False)
 
 
 def selected(live: LivePreview, where: dict[str, Any]) -> Array:

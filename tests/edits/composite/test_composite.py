@@ -118,30 +118,61 @@ def test_texture_beyond_the_fit_dims_with_the_surface():
     np.testing.assert_array_equal(out[~MASK][:100], photo.original[~MASK][:100])
 
 
-def test_a_shade_that_the_fit_lacks_stays_and_a_highlight_is_none():
-    """Green paint is made brighter red. The photo has a shade, and neither its highlight nor the fit's is one."""
-    green = np.array([0.1, 0.4, 0.15], np.float32)
-    red = np.array([0.8, 0.2, 0.15], np.float32)
-    gloss = np.float32(0.3)
-    base = np.tile(green, (1, 4, 1))
-    photo = base * np.array([1, 0.25, 1, 1], np.float32)[:, None]
-    edited = np.tile(red, (1, 4, 1))
-    photo[:, 2] += gloss
-    base[:, 3] += gloss
-    edited[:, 3] += gloss
+GREEN = np.array([0.1, 0.4, 0.15], np.float32)
+RED = np.array([0.8, 0.2, 0.15], np.float32)
+
+
+def row_of(old, new, gloss=(0, 0, 0, 0)):
+    """Layers of four pixels under white light, where `old` paint becomes `new` and `gloss` is mirrored."""
+    mirrored = np.array(gloss, np.float32)[None, :, None]
+    first, second = (np.tile(np.array(paint, np.float32), (1, 4, 1)) for paint in (old, new))
     everywhere = np.ones((1, 4), bool)
-    layers = Layers(base, edited, everywhere, everywhere, albedo=np.tile(green, (1, 4, 1)))
+    return Layers(first + mirrored, second + mirrored, everywhere, everywhere, matt=(first, second))
+
+
+def test_a_shade_that_the_fit_lacks_stays():
+    layers = row_of(GREEN, RED)
+    photo = layers.base * np.array([1, 0.25, 0.5, 2], np.float32)[:, None]
     seen = replace(FLAT.photo, linear=photo, original=photo)
     out = onto_working(seen, layers)
-    np.testing.assert_allclose(out[0, 0], red, atol=1e-6)
-    np.testing.assert_allclose(out[0, 1], 0.25 * red, rtol=0.1)
-    additive = onto_working(seen, replace(layers, albedo=None))
-    assert (additive[0, 1] > 2 * 0.25 * red)[0]
-    np.testing.assert_allclose(out[0, 2:], additive[0, 2:], rtol=0.1)
-    # Where the surface is the photo's own, the light of an edit is added to it as it is.
-    passed_on = replace(layers, edited=base + 0.1, changed=~everywhere)
-    out = onto_working(seen, passed_on)
-    np.testing.assert_allclose(out, photo + 0.1, atol=1e-6)
+    np.testing.assert_allclose(out[0, 0], RED, atol=1e-6)
+    np.testing.assert_allclose(out[0, 1], 0.25 * RED, rtol=0.1)
+    np.testing.assert_allclose(out[0, 2], 0.5 * RED, rtol=0.1)
+    # More light than the fit has is no shade; nor is anything where the surface is the photo's own.
+    additive = onto_working(seen, replace(layers, matt=None))
+    assert (additive[0, 1] > 2 * 0.25 * RED)[0]
+    np.testing.assert_allclose(out[0, 3], additive[0, 3], rtol=1e-6)
+    passed_on = replace(layers, edited=layers.base + 0.1, changed=~layers.changed)
+    np.testing.assert_allclose(onto_working(seen, passed_on), photo + 0.1, atol=1e-6)
+
+
+@pytest.mark.parametrize("new", [(0.8, 0.8, 0.8), (0.5, 0.1, 0.1)])
+def test_a_highlight_that_photo_or_fit_lacks_is_no_shade(new):
+    """A black tyre, most of whose light in the fit is mirrored, is white after the edit."""
+    black = (0.03, 0.03, 0.03)
+    layers = row_of(black, new, gloss=(0, 0.05, 0.1, 0.3))
+    photo = np.tile(np.array(black, np.float32), (1, 4, 1))
+    out = onto_working(replace(FLAT.photo, linear=photo, original=photo), layers)
+    # The highlight itself is the fit's, and is taken back.
+    np.testing.assert_allclose(out, np.tile(new, (1, 4, 1)), atol=0.02)
+
+
+def test_a_clipped_channel_is_no_shade():
+    """The fit knows that white paper is twice as bright as the photo can show."""
+    white = (0.9, 0.9, 0.9)
+    layers = row_of(white, (0.9, 0.1, 0.1))
+    brighter = replace(layers, base=2 * layers.base, edited=2 * layers.edited)
+    photo = np.ones((1, 4, 3), np.float32)
+    out = onto_working(replace(FLAT.photo, linear=photo, original=photo), brighter)
+    np.testing.assert_allclose(out, brighter.edited, rtol=1e-3)
+
+
+def test_another_roughness_shades_nothing():
+    layers = row_of(GREEN, GREEN)
+    smoother = replace(layers, edited=layers.base + 0.05)
+    photo = 0.5 * layers.base
+    out = onto_working(replace(FLAT.photo, linear=photo, original=photo), smoother)
+    np.testing.assert_allclose(out, photo + 0.05, atol=1e-6)
 
 
 def test_no_fringe_of_the_old_colour_is_left_at_a_border():

@@ -11,6 +11,7 @@ from materialist.camera import unit
 from materialist.color import linear_to_srgb
 from materialist.edits.composite.disclosed import base_scene
 from materialist.edits.material import normals
+from materialist.edits.material.detail import white_share
 from materialist.edits.material.material import edit, projected, shifted_hsv
 from materialist.errors import InputError
 from materialist.geometry.build import rebuilt, with_normals
@@ -397,3 +398,14 @@ def test_a_removal_beside_metal_is_compared_with_the_normals_of_the_photo():
     np.testing.assert_array_equal(base.materials.metallic, plain.materials.metallic)
     off = [np.abs(shading(one) - shading(plain)).max() for one in (base, removed(gold))]
     assert off[0] < 0.1 < 0.2 < off[1]
+
+
+def test_white_is_told_from_paint():
+    paint = np.array([0.1, 0.4, 0.15])
+    albedo = 2 * paint + np.array([[0.3], [0.1]])
+    np.testing.assert_allclose(white_share(albedo, paint), [0.3, 0.1], rtol=0.25)
+    np.testing.assert_allclose(white_share(albedo, 7 * paint), white_share(albedo, paint))
+    # Grey paint has the direction of white, and no channel gives more than it has.
+    grey = np.full(3, 0.5)
+    assert white_share(1.5 * grey, grey) < 1e-6
+    assert white_share(np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])) == 0

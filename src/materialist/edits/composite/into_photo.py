@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from materialist.color import white_share
 from materialist.edits.composite.border import SETTINGS as BORDER
 from materialist.edits.composite.glare import add_glare
 from materialist.edits.composite.glow import light_share
@@ -25,9 +24,7 @@ class CompositeSettings:
     """How the photo's residual over the fit follows an edit; tuned by eye unless derived."""
 
     floor: float = 0.02  # radiance added to edited and base: ratios of dark pixels count less
-    black: float = (
-        0.005  # radiance added to diffuse light, and least albedo: ratios of black are noise
-    )
+    black: float = 0.005  # radiance added to photo and diffuse light: ratios of black are noise
     max_detail_factor: float = 2.0  # on the photo's finest detail, under another light
     mixed_pixels: int = 1  # working pixels inside of a border whose maps may mix both sides
     clipped_photo: float = 0.995  # channel of a linear photo that is clipped; derived: 8 bits
@@ -237,27 +234,29 @@ def _same_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
     left = 1.0 if layers.diffuse is None else layers.diffuse[..., None]
     # A brighter surface does not amplify what the fit misses of the photo.
     factor = left * np.minimum((layers.edited + SETTINGS.floor) / (layers.base + SETTINGS.floor), 1)
-    if layers.albedo is None:
+    if layers.matt is None:
         return layers.edited - layers.base, factor - 1, layers.base
-    shade = missing_shade(photo.linear, layers.base, layers.albedo)
+    held = photo.linear if photo.hdr else _unclipped(photo.linear, layers.base)
+    shade = missing_shade(held, layers.base, layers.edited, *layers.matt)
     shade = np.where(layers.changed, shade, 1)[..., None]
     shade = 1 + left * (shade - 1)
     return shade * (layers.edited - layers.base), factor - 1, shade * layers.base
 
 
-def missing_shade(photo: Array, base: Array, albedo: Array) -> Array:
-    """[...] q in [0, 1]: the photo's diffuse light over that of the fit's rendering, both [..., 3] linear.
+def missing_shade(photo: Array, base: Array, edited: Array, old: Array, new: Array) -> Array:
+    """[...] q in [0, 1]: the photo's light over the diffuse light of the fit's rendering, where it has less.
 
-    Diffuse light has the colour of the albedo [..., 3]. A highlight that one of them has and the other lacks is white:
-    it is left out, or it would be taken for light, or its lack for shade.
+    The edit tells the diffuse light: it changes in proportion to the albedo, so that old |edited - base| / |new - old|
+    of the base is diffuse. Channels count by how much the edit changes them. All of the photo's light counts: the lack
+    of a highlight that the fit has, or one that it lacks, is no shade.
+
+    photo, base, edited: [..., 3] linear. old, new: [..., 3] albedo (1 - metallic) of the fitted and the edited scene.
     """
-    paint = np.maximum(albedo, SETTINGS.black)
-    paint = paint / np.linalg.norm(paint, axis=-1, keepdims=True)
-    parts = []
-    for light in (photo, base):
-        diffuse = light - white_share(light, paint)[..., None]
-        parts.append(np.maximum((diffuse * paint).sum(-1), 0) + SETTINGS.black)
-    return np.minimum(parts[0] / parts[1], 1)
+    weight = np.abs(new - old)
+    diffuse = np.minimum(old * np.abs(edited - base), weight * np.maximum(base, 0))
+    black = SETTINGS.black * weight.sum(-1) + 1e-9
+    seen = (weight * np.maximum(photo, 0)).sum(-1)
+    return np.minimum((seen + black) / (diffuse.sum(-1) + black), 1)
 
 
 def _other_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:

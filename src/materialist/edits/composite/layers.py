@@ -69,8 +69,8 @@ class Layers:
     """New bodies at native size, which stand before all this; under them the maps above go on from what is beside."""
     diffuse: Array | None = None
     """[H, W] in [0, 1]: what new metal leaves of the diffuse light, in which the photo's own texture is; None: all."""
-    albedo: Array | None = None
-    """[H, W, 3] of the fitted scene, by whose colour diffuse light is told from mirrored light; None: not known."""
+    matt: tuple[Array, Array] | None = None
+    """[H, W, 3] albedo (1 - metallic) of the fitted and the edited scene, to which diffuse light is proportional."""
     covered: Array | None = None
     """[H, W] bool: bodies that only one scene has and `native` has not: the rendering alone is seen; in `changed`."""
 
@@ -121,7 +121,7 @@ def render_layers(renderer: EditRenderer, edited: Scene, options: RenderOptions)
         native=alone,
         covered=covered,
         diffuse=diffuse_left(scene, edited),
-        albedo=scene.materials.albedo,
+        matt=matt_albedos(scene, edited),
     )
 
 
@@ -131,6 +131,15 @@ def diffuse_left(scene: Scene, edited: Scene) -> Array:
     old = np.maximum(1 - scene.materials.metallic, 1e-3)
     new = np.maximum(1 - edited.materials.metallic, 1e-3)
     return np.minimum(new / old, 1)
+
+
+def matt_albedos(scene: Scene, edited: Scene) -> tuple[Array, Array]:
+    """[H, W, 3] each: `Layers.matt` of an edit."""
+    first, second = (
+        shown.materials.albedo * (1 - shown.materials.metallic[..., None])
+        for shown in (scene, edited)
+    )
+    return first, second
 
 
 def changed_pixels(scene: Scene, edited: Scene) -> Array:

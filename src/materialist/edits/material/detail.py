@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from materialist.color import luminance, white_share
+from materialist.color import luminance
 from materialist.geometry.silhouette import window
 from materialist.types import Array, Scene
 
@@ -18,6 +18,8 @@ MIN_WHITE = 0.03
 """Less is none, twice as much is whole: the fit adds a little anywhere; tuned on nine made objects."""
 SAME_PAINT = 0.08
 """Standard deviation of the chromaticity, a vector of unit length, of one paint."""
+WHITE_RIDGE = 0.03
+"""Added to the square of white: of grey paint, which has the same direction, none is white; tuned by eye."""
 
 
 def core_of(weight: Array) -> Array:
@@ -42,6 +44,20 @@ def highlights(scene: Scene, weight: Array) -> Array:
     added = np.clip(added - max(float(np.median(added[inside])), 0), 0, 1)
     white[box] = added * np.clip(added / MIN_WHITE - 1, 0, 1)
     return white
+
+
+def white_share(albedo: Array, paint: Array) -> Array:
+    """[...] w >= 0 of albedo [..., 3] = s paint + w white: least squares with a ridge on w.
+
+    paint: [3], of any length.
+    """
+    paint = paint / np.linalg.norm(paint)
+    white = np.full(3, 3**-0.5)
+    # The normal equations, along unit vectors.
+    along = float(paint @ white)
+    share = (albedo @ white - along * (albedo @ paint)) / (1 + WHITE_RIDGE - along**2)
+    # No more than each channel has, or another hue would be white.
+    return np.clip(share * 3**-0.5, 0, albedo.min(-1))
 
 
 def shading_detail(

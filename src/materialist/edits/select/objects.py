@@ -10,6 +10,7 @@ from skimage.morphology import remove_small_holes
 
 from materialist.color import linear_to_srgb
 from materialist.errors import InputError
+from materialist.geometry.silhouette import Box as Window
 from materialist.geometry.silhouette import disc, window
 from materialist.predict.bundled.edges import grabcut
 from materialist.predict.clicks import segment
@@ -36,6 +37,7 @@ class SelectSettings:
 
     # The second look, at the object alone.
     margin: float = 0.2  # around its box, in longer sides of the box
+    min_margin: int = 8  # the same in pixels
     min_enlargement: float = 1.25  # what fills the photo is not seen better; derived
     min_agreement: float = 0.8  # IoU with the first mask; less: another object
 
@@ -164,47 +166,86 @@ def _outlined(scene: Scene, box: Box) -> Array:
     return np.asarray(logits[int(np.argmax(expected))])
 
 
+@dataclass(frozen=True)
+class _Crop:
+    """A part of a photo, larger than at working size."""
+
+    picture: Array
+    """[h, w, 3] sRGB in [0, 1]."""
+    scale: Array
+    """[2] its pixels for one working pixel, across and down."""
+    origin: Array
+    """[2] where its corner is in the working picture: column, row."""
+
+    def within(self, places: Array) -> Array:
+        """Places [..., 2] of the working picture, column and row, in this one."""
+        return (places - self.origin) * self.scale
+
+    def onto_working(self, values: Array, window: Window) -> Array:
+        """Values [h, w] of its pixels at the pixels of a window of the working picture."""
+        rows, columns = window
+        # A Gaussian as wide as a working pixel, of which the crop may have many.
+        smooth = cv2.GaussianBlur(values, (0, 0), *(self.scale / np.sqrt(12)))
+        corner = self.within(np.array([columns.start, rows.start]) + 0.5) - 0.5
+        placing = np.column_stack([np.diag(self.scale), corner])
+        return cv2.warpAffine(
+            smooth,
+            placing,
+            (columns.stop - columns.start, rows.stop - rows.start),
+            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+            borderMode=cv2.BORDER_REPLICATE,
+        )
+
+
 def _sharpened(scene: Scene, outline: Array, points: Sequence[tuple[int, int]] = ()) -> Array:
     """[H, W] logits of an object, to which those of a second look at it are added: at what is around it alone.
 
-    MobileSAM's masks have 256 pixels along the longer side, whatever it looks at.
+    MobileSAM's masks have 256 pixels along the longer side, whatever it looks at. All points (column, row) stay in.
     """
     mask = tidy(outline > 0, points)
     if not mask.any():
         return outline
     # --- What is around the object, at the photo's own resolution ---
     rows, columns = window(mask)
-    margin = round(SETTINGS.margin * max(rows.stop - rows.start, columns.stop - columns.start))
+    longer = max(rows.stop - rows.start, columns.stop - columns.start)
+    margin = max(round(SETTINGS.margin * longer), SETTINGS.min_margin)
     around = window(mask, margin=margin)
     shape = mask[around].shape
     if SETTINGS.min_enlargement * max(shape) > max(mask.shape):
         return outline
-    picture = _native(scene.photo, mask, margin)
-    # --- MobileSAM's mask there that is the same object ---
-    across = picture.shape[1] / shape[1]
-    down = picture.shape[0] / shape[0]
-    left, right = (across * (x - around[1].start) for x in (columns.start, columns.stop))
-    top, bottom = (down * (y - around[0].start) for y in (rows.start, rows.stop))
-    logits, _ = sam.masks(picture, box=(round(left), round(top), round(right), round(bottom)))
-    looks = [cv2.resize(one, shape[::-1], interpolation=cv2.INTER_AREA) for one in logits]
-    agreement = [overlap(look > 0, mask[around]) for look in looks]
-    best = int(np.argmax(agreement))
-    if agreement[best] < SETTINGS.min_agreement:
-        return outline
-    sharpened = outline.copy()
-    sharpened[around] += looks[best]
-    return sharpened
+    crop = _crop(scene.photo, mask, margin)
+    # --- MobileSAM's masks there; the one that is the same object ---
+    corners = crop.within(np.array([[columns.start, rows.start], [columns.stop, rows.stop]]))
+    left, top, right, bottom = np.round(corners).astype(int).ravel().tolist()
+    logits, _ = sam.masks(crop.picture, box=(left, top, right, bottom))
+    best = outline
+    agreement = SETTINGS.min_agreement
+    for look in logits:
+        placed = crop.onto_working(look, around)
+        same = overlap(placed > 0, mask[around])
+        sharpened = outline.copy()
+        sharpened[around] += placed
+        if same >= agreement and all(sharpened[y, x] > 0 for x, y in points):
+            best = sharpened
+            agreement = same
+    return best
 
 
-def _native(photo: Photo, mask: Array, margin: int) -> Array:
-    """[h, w, 3] sRGB in [0, 1] around a mask [H, W] bool, at the photo's resolution or the one that MobileSAM sees."""
-    picture = photo.original[window(mask, photo.original.shape[:2], margin)]
+def _crop(photo: Photo, mask: Array, margin: int) -> _Crop:
+    """What is around a mask [H, W] bool, at the photo's resolution or the one that MobileSAM sees."""
+    native = photo.original.shape[:2]
+    rows, columns = window(mask, native, margin)
+    picture = photo.original[rows, columns]
     height, width = picture.shape[:2]
-    scale = sam.SIDE / max(height, width)
-    if scale < 1:
-        size = (max(1, round(scale * width)), max(1, round(scale * height)))
+    reduced = min(sam.SIDE / max(height, width), 1)
+    if reduced < 1:
+        size = (max(1, round(reduced * width)), max(1, round(reduced * height)))
         picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
-    return linear_to_srgb(picture)
+    # A working pixel in pixels of the photo, and in those of the picture.
+    of_native = np.array([native[1] / mask.shape[1], native[0] / mask.shape[0]])
+    kept = np.array([picture.shape[1] / width, picture.shape[0] / height])
+    origin = np.array([columns.start, rows.start]) / of_native
+    return _Crop(linear_to_srgb(picture), of_native * kept, origin)
 
 
 def _soft_overlap(likely: Array, mask: Array) -> float:
