@@ -49,6 +49,32 @@ def test_a_slanting_edge_crosses_the_hole():
     assert np.abs(guess - picture)[hole].mean() < 0.1
 
 
+def test_the_answer_on_which_mirror_images_agree_is_taken(monkeypatch):
+    """The network of this test puts a bright spot in the hole of the first picture that it sees."""
+    picture, _ = two_walls()
+    hole = hole_in(picture.shape[:2])
+    seen = []
+
+    def network(path, inputs):
+        answer = inputs["image"].copy()
+        row, column = (int(np.mean(places)) for places in np.nonzero(inputs["mask"][0, 0] == 0))
+        answer[0, :, inputs["mask"][0, 0] == 0] = 100 + 4 * len(seen)
+        if not seen:
+            answer[0, :, row - 20 : row + 20, column - 20 : column + 20] = 255
+        seen.append(inputs["image"])
+        return [answer]
+
+    monkeypatch.setattr(filling, "run", network)
+    guess = filled(without(picture, hole), hole, ~hole)
+    (level,) = np.unique(np.round(255 * linear_to_srgb(guess[hole])))
+    assert level in (104, 108, 112)
+    # What it sees are the four mirror images.
+    assert len(seen) == 4
+    for other, axes in zip(seen[1:], (1, 2, (1, 2)), strict=True):
+        apart = np.flip(other[0], axes).astype(int) - seen[0][0]
+        assert np.abs(apart).max() <= 1  # the enlargement rounds
+
+
 def test_what_may_not_be_seen_changes_nothing(blurred):
     picture, _ = two_walls()
     hole = hole_in(picture.shape[:2])

@@ -34,6 +34,8 @@ class FillingSettings:
     max_side: int = 1024  # longer side of the photo that the network's square is cut from
     min_side: int = 512  # longer side that it is enlarged to where it is smaller
     least_side: int = 4  # shorter side that the network reads; derived: it fails below
+    # sides about which the picture is mirrored (rows, columns) for one answer each
+    mirrored: tuple[tuple[int, ...], ...] = ((), (0,), (1,), (0, 1))
     floor: float = 0.05  # radiance: HDR values differ by sums below, by ratios above
     rim: float = 0.1  # around a hole in an HDR photo, longer sides: there the range is measured
     brightest: float = 99.0  # percentile there that is white: a lamp would leave few levels
@@ -129,7 +131,22 @@ def _kept(levels: Array, unknown: Array) -> Array:
 
 
 def _inpainted(levels: Array, unknown: Array) -> Array:
-    """uint8 levels [h, w, 3] with `unknown` [h, w] bool filled."""
+    """uint8 levels [h, w, 3] with `unknown` [h, w] bool filled.
+
+    The network sees the picture and its mirror images; of its answers the one nearest to their mean is taken. What only
+    one of them has, as a thing that nothing around hints at, is an accident.
+    """
+    answers = []
+    for axes in SETTINGS.mirrored:
+        picture, hole = (np.ascontiguousarray(np.flip(x, axes)) for x in (levels, unknown))
+        answers.append(np.flip(_answer(picture, hole), axes))
+    inside = np.stack([answer[unknown] for answer in answers]).astype(np.float32)
+    apart = ((inside - inside.mean(0)) ** 2).mean((1, 2))
+    return np.ascontiguousarray(answers[int(apart.argmin())])
+
+
+def _answer(levels: Array, unknown: Array) -> Array:
+    """What the network makes of levels [h, w, 3] uint8 with a hole [h, w] bool, of the same size."""
     # --- What is too thin goes on beyond its sides ---
     height, width = unknown.shape
     more = [(0, max(0, SETTINGS.least_side - n)) for n in (height, width)]
