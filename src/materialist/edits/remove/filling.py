@@ -136,17 +136,6 @@ def _inpainted(levels: Array, unknown: Array) -> Array:
     The network sees the picture and its mirror images; of its answers the one nearest to their mean is taken. What only
     one of them has, as a thing that nothing around hints at, is an accident.
     """
-    answers = []
-    for axes in SETTINGS.mirrored:
-        picture, hole = (np.ascontiguousarray(np.flip(x, axes)) for x in (levels, unknown))
-        answers.append(np.flip(_answer(picture, hole), axes))
-    inside = np.stack([answer[unknown] for answer in answers]).astype(np.float32)
-    apart = ((inside - inside.mean(0)) ** 2).mean((1, 2))
-    return np.ascontiguousarray(answers[int(apart.argmin())])
-
-
-def _answer(levels: Array, unknown: Array) -> Array:
-    """What the network makes of levels [h, w, 3] uint8 with a hole [h, w] bool, of the same size."""
     # --- What is too thin goes on beyond its sides ---
     height, width = unknown.shape
     more = [(0, max(0, SETTINGS.least_side - n)) for n in (height, width)]
@@ -162,9 +151,20 @@ def _answer(levels: Array, unknown: Array) -> Array:
     picture = cv2.resize(smooth.astype(np.uint8), large, interpolation=cv2.INTER_CUBIC)
     small = np.where(unknown, 0, 255).astype(np.uint8)
     known = np.asarray(cv2.resize(small, large, interpolation=cv2.INTER_NEAREST))
-    # --- MI-GAN: 0 in the mask is what it fills ---
+    # --- The answer on which most of them agree ---
+    answers = []
+    for axes in SETTINGS.mirrored:
+        answer = np.flip(_answer(np.flip(picture, axes), np.flip(known, axes)), axes)
+        answer = np.ascontiguousarray(answer)
+        answers.append(np.asarray(cv2.resize(answer, size, interpolation=cv2.INTER_AREA)))
+    inside = np.stack([answer[unknown] for answer in answers]).astype(np.float32)
+    apart = ((inside - inside.mean(0)) ** 2).mean((1, 2))
+    return np.ascontiguousarray(answers[int(apart.argmin())][:height, :width])
+
+
+def _answer(picture: Array, known: Array) -> Array:
+    """MI-GAN's filling of a picture [h, w, 3] uint8 where `known` [h, w] uint8 is 0."""
     channels_first = np.ascontiguousarray(np.moveaxis(picture, -1, 0))
-    painted = run(NETWORK, {"image": channels_first[None], "mask": known[None, None]})[0]
-    result = np.ascontiguousarray(np.moveaxis(painted[0], 0, -1))
-    result = np.asarray(cv2.resize(result, size, interpolation=cv2.INTER_AREA))
-    return np.ascontiguousarray(result[:height, :width])
+    mask = np.ascontiguousarray(known)
+    painted = run(NETWORK, {"image": channels_first[None], "mask": mask[None, None]})[0]
+    return np.asarray(np.moveaxis(painted[0], 0, -1))

@@ -9,14 +9,14 @@ from scipy import ndimage
 from skimage.morphology import remove_small_holes
 
 from materialist.color import linear_to_srgb
+from materialist.edits.select.crop import crop_around
 from materialist.errors import InputError
-from materialist.geometry.silhouette import Box as Window
 from materialist.geometry.silhouette import disc, window
 from materialist.predict.bundled.edges import grabcut
 from materialist.predict.clicks import segment
 from materialist.predict.clicks.features import Box
 from materialist.predict.sam import masks as sam
-from materialist.types import Array, Photo, Scene
+from materialist.types import Array, Scene
 
 
 @dataclass(frozen=True)
@@ -166,37 +166,6 @@ def _outlined(scene: Scene, box: Box) -> Array:
     return np.asarray(logits[int(np.argmax(expected))])
 
 
-@dataclass(frozen=True)
-class _Crop:
-    """A part of a photo, larger than at working size."""
-
-    picture: Array
-    """[h, w, 3] sRGB in [0, 1]."""
-    scale: Array
-    """[2] its pixels for one working pixel, across and down."""
-    origin: Array
-    """[2] where its corner is in the working picture: column, row."""
-
-    def within(self, places: Array) -> Array:
-        """Places [..., 2] of the working picture, column and row, in this one."""
-        return (places - self.origin) * self.scale
-
-    def onto_working(self, values: Array, window: Window) -> Array:
-        """Values [h, w] of its pixels at the pixels of a window of the working picture."""
-        rows, columns = window
-        # A Gaussian as wide as a working pixel, of which the crop may have many.
-        smooth = cv2.GaussianBlur(values, (0, 0), *(self.scale / np.sqrt(12)))
-        corner = self.within(np.array([columns.start, rows.start]) + 0.5) - 0.5
-        placing = np.column_stack([np.diag(self.scale), corner])
-        return cv2.warpAffine(
-            smooth,
-            placing,
-            (columns.stop - columns.start, rows.stop - rows.start),
-            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-            borderMode=cv2.BORDER_REPLICATE,
-        )
-
-
 def _sharpened(scene: Scene, outline: Array, points: Sequence[tuple[int, int]] = ()) -> Array:
     """[H, W] logits of an object, to which those of a second look at it are added: at what is around it alone.
 
@@ -213,7 +182,7 @@ def _sharpened(scene: Scene, outline: Array, points: Sequence[tuple[int, int]] =
     shape = mask[around].shape
     if SETTINGS.min_enlargement * max(shape) > max(mask.shape):
         return outline
-    crop = _crop(scene.photo, mask, margin)
+    crop = crop_around(scene.photo, mask, margin, sam.SIDE)
     # --- MobileSAM's masks there; the one that is the same object ---
     corners = crop.within(np.array([[columns.start, rows.start], [columns.stop, rows.stop]]))
     left, top, right, bottom = np.round(corners).astype(int).ravel().tolist()
@@ -221,7 +190,7 @@ def _sharpened(scene: Scene, outline: Array, points: Sequence[tuple[int, int]] =
     best = outline
     agreement = SETTINGS.min_agreement
     for look in logits:
-        placed = crop.onto_working(look, around)
+        placed = crop.at_working_size(look, around)
         same = overlap(placed > 0, mask[around])
         sharpened = outline.copy()
         sharpened[around] += placed
@@ -229,23 +198,6 @@ def _sharpened(scene: Scene, outline: Array, points: Sequence[tuple[int, int]] =
             best = sharpened
             agreement = same
     return best
-
-
-def _crop(photo: Photo, mask: Array, margin: int) -> _Crop:
-    """What is around a mask [H, W] bool, at the photo's resolution or the one that MobileSAM sees."""
-    native = photo.original.shape[:2]
-    rows, columns = window(mask, native, margin)
-    picture = photo.original[rows, columns]
-    height, width = picture.shape[:2]
-    reduced = min(sam.SIDE / max(height, width), 1)
-    if reduced < 1:
-        size = (max(1, round(reduced * width)), max(1, round(reduced * height)))
-        picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
-    # A working pixel in pixels of the photo, and in those of the picture.
-    of_native = np.array([native[1] / mask.shape[1], native[0] / mask.shape[0]])
-    kept = np.array([picture.shape[1] / width, picture.shape[0] / height])
-    origin = np.array([columns.start, rows.start]) / of_native
-    return _Crop(linear_to_srgb(picture), of_native * kept, origin)
 
 
 def _soft_overlap(likely: Array, mask: Array) -> float:
