@@ -16,8 +16,8 @@ SIGMA = 0.7
 def shading_residual(photo: Array, rerender: Array) -> Array:
     """[H, W, 3] float32 factor in [1/8, 8]: the photo is about `rerender` times it (both [H, W, 3] linear).
 
-    It holds shading that light and geometry lack, and highlights of lights that the map has not; it is never a part of
-    the albedo. Pixels without a number in the rendering have 1.
+    It holds shading that light and geometry lack, and highlights of lights that the environment map lacks. The scene's
+    albedo never includes it; exports may (`exporters.residual`). Pixels that the rendering has as NaN have 1.
     """
     # In logarithms, so that a factor and its inverse weigh alike in the mean.
     ratio = np.log((np.maximum(photo, 0) + FLOOR) / (np.maximum(rerender, 0) + FLOOR))

@@ -50,7 +50,7 @@ def test_formulas_agree_with_the_reference(name):
     )
     shape = ggx.distribution(sin2, alpha) * ggx.smith_g1(cos_i, alpha) * ggx.smith_g1(cos_o, alpha)
     s0, s1 = reference.specular_split(rough, UP, wi, wo)
-    close(shape / (4 * cos_i * cos_o) * (1 - disney.schlick(there(cos_d))), s0)
+    close(shape / (4 * cos_i * cos_o) * (1 - disney.schlick_weight(there(cos_d))), s0)
     close(
         disney.half_vector_density(cos_i, sin2, alpha) * ggx.smith_g1(cos_o, alpha) / cos_o, s0 + s1
     )

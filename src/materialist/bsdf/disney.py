@@ -19,8 +19,8 @@ def base_reflectance(albedo, metallic):
     return DIELECTRIC_R0 * (1 - metallic) + metallic * albedo
 
 
-def schlick(cosine):
-    """(1 - cos)^5 of Schlick's approximation."""
+def schlick_weight(cosine):
+    """Schlick's weight (1 - cos)^5; the reflectance F is `fresnel`."""
     # Powers by products: exact in every library, and cheaper to differentiate.
     m = array_module(cosine).clip(1 - cosine, 0, 1)
     m2 = m * m
@@ -34,8 +34,8 @@ def diffuse_coefficients(cos_i, cos_o, cos_d):
     """
     # F_d(w) = 1 - 0.5 f + 2 R (h.w)^2 f with f = (1 - n.w)^5: a constant and a slope in R for
     # each direction.
-    fi = schlick(cos_i)
-    fo = schlick(cos_o)
+    fi = schlick_weight(cos_i)
+    fo = schlick_weight(cos_o)
     slope = 2 * cos_d * cos_d
     at_zero_i = 1 - 0.5 * fi
     at_zero_o = 1 - 0.5 * fo
@@ -64,16 +64,16 @@ def combine_by_albedo(metallic, diffuse, s0, s1):
 
 def fresnel(base, cosine):
     """F_s: Schlick's reflectance of base reflectance C_0."""
-    return base + (1 - base) * schlick(cosine)
+    return base + (1 - base) * schlick_weight(cosine)
 
 
-def half_vector_density(cos_wo, sin2_h, alpha):
-    """Density, per solid angle of the mirrored direction, of mirroring `wo` at its visible normals."""
+def half_vector_density(cos_view, sin2_h, alpha):
+    """Density, per solid angle, of the view direction reflected at a visible normal: D(h) G1(v) / (4 n.v)."""
     return (
-        # D(h) G1(wo) max(h.wo, 0) / (n.wo) over the Jacobian 4 (h.wo) of the reflection.
+        # D(h) G1(v) max(h.v, 0) / (n.v) over the Jacobian 4 (h.v) of the reflection.
         distribution(sin2_h, alpha)
-        * smith_g1(cos_wo, alpha)
-        / (4 * array_module(cos_wo).clip(cos_wo, 1e-6, 1))
+        * smith_g1(cos_view, alpha)
+        / (4 * array_module(cos_view).clip(cos_view, 1e-6, 1))
     )
 
 

@@ -18,10 +18,8 @@ def register_disney() -> None:
     class SimplifiedDisney(mi.BSDF):
         """f_r = f_s + (1 - M) f_d (paper, Preliminary); both sides shade alike.
 
-        A ray meets the back only where face and shading normal both say so: where the latter turns away from a ray
-        that meets the front, it is still the front's light that is seen. Where the shading normal sees below the face,
-        light comes from as far above the face instead (see `lobes.lifted`): nothing passes through the
-        surface, and nothing is lost.
+        A ray meets the back only where shading normal and geometric normal agree on it. Directions below the face are
+        mirrored to above it (`lobes.lifted`), so that no light passes through the surface and none is lost.
 
         Textures: base_color (RGB), roughness (perceptual, alpha = r^2), metallic.
         """
@@ -85,7 +83,7 @@ def register_disney() -> None:
             return dr.select(active, value, mi.Color3f(0)), dr.select(active, pdf, 0)
 
         def _side(self, si):
-            """-1 where `si.wi` lies behind the shading normal and on the other side of the face than that, else 1."""
+            """-1 where `si.wi` is behind the shading normal and the geometric normal of that side, else 1."""
             face = si.to_local(si.n)
             front = (si.wi.z > 0) | (dr.dot(face, si.wi) * face.z > 0)
             return dr.select(front, mi.Float(1), mi.Float(-1))

@@ -1,6 +1,6 @@
 """The two lobes of the BRDF for Dr.Jit: values, sampling, and normals that see below the face they belong to.
 
-Directions are unit vectors in the local shading frame, above the surface.
+Directions are unit vectors in the local shading frame, above the surface. As in Mitsuba, `wi` points to the viewer.
 """
 
 import drjit as dr
@@ -16,8 +16,8 @@ from materialist.bsdf.disney import (
 )
 
 AGREEING = 0.7
-"""Least cosine between a shading normal and its face for the face to hold back light: where a predicted depth slopes
-and the predicted normal does not, the slope is an outline that was smeared, and what it hides was never hidden."""
+"""Least cosine between shading and geometric normal for the face to block light. Below it the face is taken for a
+depth edge that the prediction smeared."""
 
 
 def half_vector(wi, wo):

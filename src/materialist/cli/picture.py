@@ -108,14 +108,14 @@ def write_result(
 
 def _last_picture(scene: Any, edited: Any, rendering: Rendering, progress: Any) -> Any:
     """The composite of a scene that the command makes no other picture of."""
-    from materialist.edits.composite.composite import spent_composite
+    from materialist.edits.composite.composite import composite_in_place
     from materialist.edits.core.renderer import RenderOptions
 
     settings = dict(rendering.compositing)
     names = ("spp", "seed", "denoise", "device")
     chosen = {name: settings.pop(name) for name in names}
     options = RenderOptions(**chosen, progress=progress)
-    return spent_composite(scene, edited, options, **settings)
+    return composite_in_place(scene, edited, options, **settings)
 
 
 def write_picture(

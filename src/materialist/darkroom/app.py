@@ -15,7 +15,7 @@ from starlette.routing import Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.websockets import WebSocket
 
-from materialist.darkroom import bodies, editing, opening, seeing, taking
+from materialist.darkroom import editing, opening, requests, seeing, taking
 from materialist.darkroom.channel import channel
 from materialist.darkroom.desk import Desk, Desks
 from materialist.darkroom.endpoint import Answer, got, guarded, posted
@@ -36,37 +36,37 @@ from materialist.studio.studio import Studio
 SWEEP = 10.0
 """Seconds between two looks for pages that were closed."""
 STATIC = Path(str(files("materialist.darkroom") / "static"))
-_POSTED: dict[str, tuple[type[bodies.RequestBody], Any]] = {
+_POSTED: dict[str, tuple[type[requests.RequestBody], Any]] = {
     # Photos.
-    "start": (bodies.Start, opening.start),
-    "open": (bodies.Named, opening.open_project),
-    "close": (bodies.Nothing, opening.close_project),
-    "rename": (bodies.Renamed, opening.rename),
-    "discard": (bodies.Named, opening.discard),
-    "stop": (bodies.Numbered, lambda desk, body: desk.stop(body.number)),
+    "start": (requests.Start, opening.start),
+    "open": (requests.Named, opening.open_project),
+    "close": (requests.Nothing, opening.close_project),
+    "rename": (requests.Renamed, opening.rename),
+    "discard": (requests.Named, opening.discard),
+    "stop": (requests.Numbered, lambda desk, body: desk.stop(body.number)),
     # Selecting.
-    "pick": (bodies.Pick, editing.pick),
-    "point": (bodies.Pointed, editing.point),
-    "resize": (bodies.Resized, editing.resize),
-    "material": (bodies.Nothing, editing.keep_material),
-    "deselect": (bodies.Nothing, editing.deselect),
-    "colour": (bodies.Pointed, seeing.colour_at),
+    "pick": (requests.Pick, editing.pick),
+    "point": (requests.Pointed, editing.point),
+    "resize": (requests.Resized, editing.resize),
+    "material": (requests.Nothing, editing.keep_material),
+    "deselect": (requests.Nothing, editing.deselect),
+    "colour": (requests.Pointed, seeing.colour_at),
     # Changing.
-    "set": (bodies.Options, editing.set_options),
-    "use": (bodies.File, editing.use_file),
-    "light": (bodies.Chosen, editing.choose_light),
-    "lamp": (bodies.NewLamp, editing.add_lamp),
-    "lamps": (bodies.MovedLamp, editing.set_lamp),
-    "object": (bodies.Chosen, editing.choose_object),
-    "place": (bodies.Put, editing.put_object),
-    "fall": (bodies.Fall, editing.let_fall),
+    "set": (requests.Options, editing.set_options),
+    "use": (requests.File, editing.use_file),
+    "light": (requests.Chosen, editing.choose_light),
+    "lamp": (requests.NewLamp, editing.add_lamp),
+    "lamps": (requests.MovedLamp, editing.set_lamp),
+    "object": (requests.Chosen, editing.choose_object),
+    "place": (requests.Put, editing.put_object),
+    "fall": (requests.Fall, editing.let_fall),
     # The list.
-    "act": (bodies.Act, editing.act),
-    "undo": (bodies.Undo, editing.undo),
-    "load": (bodies.LoadedList, taking.load),
+    "act": (requests.Act, editing.act),
+    "undo": (requests.Undo, editing.undo),
+    "load": (requests.LoadedList, taking.load),
     # Taking away.
-    "final": (bodies.Nothing, taking.render),
-    "take": (bodies.Take, taking.take),
+    "final": (requests.Nothing, taking.render),
+    "take": (requests.Take, taking.take),
 }
 """Place under /api -> the body of its requests, and what answers them."""
 

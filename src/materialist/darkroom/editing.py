@@ -3,7 +3,7 @@
 from functools import partial
 from typing import Any
 
-from materialist.darkroom import bodies
+from materialist.darkroom import requests
 from materialist.darkroom.desk import Desk
 from materialist.darkroom.removing import take_away, when_filled
 from materialist.darkroom.state import outline, settable, state
@@ -23,7 +23,7 @@ _NUMBERS = {"click": 2, "box": 4, "brush": 0}
 """Tool -> how many numbers say where it was used."""
 
 
-def pick(desk: Desk, body: bodies.Pick) -> State:
+def pick(desk: Desk, body: requests.Pick) -> State:
     """A click, a box or a brush stroke."""
     if len(body.at) != _NUMBERS[body.tool] or min(body.at, default=0) < 0:
         raise InputError("The click could not be read; reload the page.")
@@ -37,7 +37,7 @@ def pick(desk: Desk, body: bodies.Pick) -> State:
     return state(desk)
 
 
-def point(desk: Desk, body: bodies.Pointed) -> State:
+def point(desk: Desk, body: requests.Pointed) -> State:
     """The outline of what a click would take, or of the edit that it would open."""
     session = desk.session
     index = edit_at(session, *body.at)
@@ -60,14 +60,14 @@ def edit_at(session: Session, x: float, y: float) -> int | None:
     return session.preview.call(reopening.edit_at, **arguments)
 
 
-def resize(desk: Desk, body: bodies.Resized) -> State:
+def resize(desk: Desk, body: requests.Resized) -> State:
     """The selection with the next larger, or smaller, object at the last click."""
     session = desk.session
     session.reselect(lambda selection: selection.resized(body.larger, session.preview.select))
     return state(desk)
 
 
-def keep_material(desk: Desk, body: bodies.Nothing) -> State:
+def keep_material(desk: Desk, body: requests.Nothing) -> State:
     """Of what the last click selected only what has its material."""
     session = desk.session
     narrowed = partial(session.preview.call, views.of_material)
@@ -75,12 +75,12 @@ def keep_material(desk: Desk, body: bodies.Nothing) -> State:
     return state(desk)
 
 
-def deselect(desk: Desk, body: bodies.Nothing) -> State:
+def deselect(desk: Desk, body: requests.Nothing) -> State:
     desk.session.deselect()
     return state(desk)
 
 
-def set_options(desk: Desk, body: bodies.Options) -> State:
+def set_options(desk: Desk, body: requests.Options) -> State:
     """Set or clear options of the current edit, of the light, or of the object."""
     options = {name: _text(body.kind, name, value) for name, value in body.options.items()}
     session = desk.session
@@ -110,7 +110,7 @@ def _text(kind: str, name: str, value: Any) -> Any:
     return value if isinstance(value, str) else number_text(value)
 
 
-def use_file(desk: Desk, body: bodies.File) -> State:
+def use_file(desk: Desk, body: requests.File) -> State:
     """Use an upload as a texture, an environment, or an object."""
     session = desk.session
     file = desk.studio.files.path(session.person, body.file)
@@ -130,7 +130,7 @@ def use_file(desk: Desk, body: bodies.File) -> State:
 # Light
 
 
-def choose_light(desk: Desk, body: bodies.Chosen) -> State:
+def choose_light(desk: Desk, body: requests.Chosen) -> State:
     """A computed environment, or the photo's own light (None)."""
     session = desk.session
     if body.name is None:
@@ -142,12 +142,12 @@ def choose_light(desk: Desk, body: bodies.Chosen) -> State:
     return state(desk)
 
 
-def add_lamp(desk: Desk, body: bodies.NewLamp) -> State:
+def add_lamp(desk: Desk, body: requests.NewLamp) -> State:
     place_lamp(desk.session, *body.at, body.kelvin, body.power, body.before)
     return state(desk)
 
 
-def set_lamp(desk: Desk, body: bodies.MovedLamp) -> State:
+def set_lamp(desk: Desk, body: requests.MovedLamp) -> State:
     """One lamp moved, changed or taken away: the others stay as they are, whoever moves them meanwhile."""
     session = desk.session
     if body.lamp is not None:
@@ -159,7 +159,7 @@ def set_lamp(desk: Desk, body: bodies.MovedLamp) -> State:
 # Objects
 
 
-def choose_object(desk: Desk, body: bodies.Chosen) -> State:
+def choose_object(desk: Desk, body: requests.Chosen) -> State:
     """An object of the library; the next place that is clicked gets it."""
     if body.name not in objects.LIBRARY:
         raise InputError(f"There is no object '{body.name}'; choose one of the list.")
@@ -168,13 +168,13 @@ def choose_object(desk: Desk, body: bodies.Chosen) -> State:
     return state(desk)
 
 
-def put_object(desk: Desk, body: bodies.Put) -> State:
+def put_object(desk: Desk, body: requests.Put) -> State:
     """Stand the current object, or a new one, at a place; a drag sends many."""
     objects.place(desk.session, *body.at)
     return state(desk, quiet=body.quiet)
 
 
-def let_fall(desk: Desk, body: bodies.Fall) -> State:
+def let_fall(desk: Desk, body: requests.Fall) -> State:
     notes = objects.let_fall(desk.session, body.height)
     return {**state(desk), "notes": [desk.session.without_folders(note) for note in notes]}
 
@@ -182,7 +182,7 @@ def let_fall(desk: Desk, body: bodies.Fall) -> State:
 # The list
 
 
-def act(desk: Desk, body: bodies.Act) -> State:
+def act(desk: Desk, body: requests.Act) -> State:
     session = desk.session
     if body.action == "choose":
         session.act(body.action, body.index)
@@ -192,7 +192,7 @@ def act(desk: Desk, body: bodies.Act) -> State:
     return state(desk)
 
 
-def undo(desk: Desk, body: bodies.Undo) -> State:
+def undo(desk: Desk, body: requests.Undo) -> State:
     session = desk.session
     after = session.undone(again=body.again)
     when_filled(desk, after, lambda: session.undo(again=body.again))

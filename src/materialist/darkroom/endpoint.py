@@ -12,8 +12,8 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
-from materialist.darkroom.bodies import RequestBody, complaint
 from materialist.darkroom.desk import Desk, Desks
+from materialist.darkroom.requests import RequestBody, complaint
 from materialist.errors import MaterialistError
 from materialist.studio.access.gate import PAGE_HEADER
 from materialist.studio.studio import LOCAL_PERSON, PERSON_HEADER, Studio

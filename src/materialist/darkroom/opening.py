@@ -12,7 +12,7 @@ from typing import Any
 from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response
 
-from materialist.darkroom import bodies
+from materialist.darkroom import requests
 from materialist.darkroom.desk import POLL, Desk, Desks, Followed, found_file
 from materialist.darkroom.endpoint import desk_of
 from materialist.darkroom.state import example_file, project_facts, state
@@ -84,7 +84,7 @@ def _safe_name(name: str) -> str:
 # Projects
 
 
-def start(desk: Desk, body: bodies.Start) -> State:
+def start(desk: Desk, body: requests.Start) -> State:
     """Take a photo apart; a zipped scene is opened as it is."""
     studio = desk.studio
     source = _source(desk, body)
@@ -96,7 +96,7 @@ def start(desk: Desk, body: bodies.Start) -> State:
     return state(desk)
 
 
-def _source(desk: Desk, body: bodies.Start) -> Path:
+def _source(desk: Desk, body: requests.Start) -> Path:
     """The file of a photo. Raises InputError for none, and for another's."""
     studio = desk.studio
     person = desk.person
@@ -110,7 +110,7 @@ def _source(desk: Desk, body: bodies.Start) -> Path:
     return Path(studio.public_copy(person, file, f"{body.example}{file.suffix}"))
 
 
-def open_project(desk: Desk, body: bodies.Named) -> State:
+def open_project(desk: Desk, body: requests.Named) -> State:
     """Open a project of this person, or follow its inversion if that still runs."""
     project = desk.studio.project(body.project, desk.person)
     job = _running(desk, project)
@@ -131,7 +131,7 @@ def arrive(desk: Desk) -> State:
     known = {project["name"] for project in listed(desk)}
     try:
         if session.project is None and desk.expected is None and last in known:
-            return open_project(desk, bodies.Named(project=str(last)))
+            return open_project(desk, requests.Named(project=str(last)))
         session.take_over()
     except MaterialistError as error:
         return {**state(desk), "notes": [session.without_folders(str(error))]}
@@ -139,13 +139,13 @@ def arrive(desk: Desk) -> State:
         # A photo that cannot be shown must not keep its owner from the others.
         traceback.print_exception(error)
         words = f"The photo was closed: something went wrong inside ({type(error).__name__})."
-        return {**close_project(desk, bodies.Nothing()), "notes": [words]}
+        return {**close_project(desk, requests.Nothing()), "notes": [words]}
     if session.project is None:
         studio.get_ready()
     return state(desk)
 
 
-def close_project(desk: Desk, body: bodies.Nothing) -> State:
+def close_project(desk: Desk, body: requests.Nothing) -> State:
     """Back to the choice of photos; edits and inversions stay."""
     desk.studio.put_away(desk.page)
     desk.expected = None
@@ -164,7 +164,7 @@ def listed(desk: Desk) -> list[State]:
     ]
 
 
-def rename(desk: Desk, body: bodies.Renamed) -> list[State]:
+def rename(desk: Desk, body: requests.Renamed) -> list[State]:
     renamed = desk.studio.work.rename(_own(desk, body.project), body.title)
     session = desk.studio.session_on(renamed, desk.person)
     if session is not None and session.project is not None:
@@ -173,7 +173,7 @@ def rename(desk: Desk, body: bodies.Renamed) -> list[State]:
     return listed(desk)
 
 
-def discard(desk: Desk, body: bodies.Named) -> list[State]:
+def discard(desk: Desk, body: requests.Named) -> list[State]:
     """Delete a project of this person, stopping its inversion; the open one is closed first."""
     project = _own(desk, body.project)
     desk.studio.discard(project)

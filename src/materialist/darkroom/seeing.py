@@ -3,7 +3,7 @@
 import re
 from typing import Any
 
-from materialist.darkroom import bodies
+from materialist.darkroom import requests
 from materialist.darkroom.desk import Desk
 from materialist.edits.core.operation import Target
 from materialist.errors import InputError
@@ -27,7 +27,7 @@ def skin_jpeg(desk: Desk) -> bytes:
     return bytes(session.preview.call(views.picture, steps=steps, panes=panes))
 
 
-def colour_at(desk: Desk, body: bodies.Pointed) -> dict[str, Any]:
+def colour_at(desk: Desk, body: requests.Pointed) -> dict[str, Any]:
     """The colour of the surface at a pixel, without the light on it, as #rrggbb."""
     session = desk.session
     column, row = session.pixel(*body.at)

@@ -7,7 +7,7 @@ from typing import Any
 from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 
-from materialist.darkroom import bodies
+from materialist.darkroom import requests
 from materialist.darkroom.desk import Desk, Followed
 from materialist.darkroom.state import state
 from materialist.edits.recipe import Step
@@ -21,14 +21,14 @@ from materialist.studio.tasks import KINDS, PICTURES, kinds_here
 from materialist.studio.workspace import Project
 
 
-def render(desk: Desk, body: bodies.Nothing) -> dict[str, Any]:
+def render(desk: Desk, body: requests.Nothing) -> dict[str, Any]:
     """Path-trace the edits; the page shows the picture when it is there."""
     _active_steps(desk)
     _traced(desk, None)
     return state(desk)
 
 
-def take(desk: Desk, body: bodies.Take) -> dict[str, Any]:
+def take(desk: Desk, body: requests.Take) -> dict[str, Any]:
     """Make a file to take away; the page gets its id when it is there."""
     session = desk.session
     if body.kind not in kinds_here():
@@ -67,7 +67,7 @@ def take(desk: Desk, body: bodies.Take) -> dict[str, Any]:
     return {}
 
 
-def load(desk: Desk, body: bodies.LoadedList) -> dict[str, Any]:
+def load(desk: Desk, body: requests.LoadedList) -> dict[str, Any]:
     """Put the steps of an uploaded list in place of the edits."""
     desk.session.read_edits(desk.studio.files.path(desk.person, body.file))
     return state(desk)

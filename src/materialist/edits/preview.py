@@ -15,7 +15,7 @@ import numpy as np
 from materialist.buffers import placed
 from materialist.camera import pixel_rays
 from materialist.edits.composite.into_photo import onto_working, overall_factor
-from materialist.edits.composite.layers import Layers, changed_pixels, diffuse_left, matt_albedos
+from materialist.edits.composite.layers import Layers, changed_pixels, diffuse_albedos, diffuse_kept
 from materialist.edits.core.renderer import is_relit
 from materialist.edits.core.surfaces import dimmed_emitters
 from materialist.envmap import environment
@@ -63,13 +63,13 @@ class Preview:
         self._file = file
         self._key = _key(scene)
         self._other: tuple[Array, Tables, Array] | None = None
-        """Another light, its tables, and what surfaces pass on under it."""
+        """Another light, its tables, and the outgoing radiance of the surfaces under it."""
         self._turned: tuple[Array, TransportCache, Guide] | None = None
         """Normals [H, W, 3] of an edit, the rays of the pixels where they differ, and their surfaces."""
         self._turned_tables: tuple[Tables, Tables] | None = None
         """Tables of the scene's own normals, and the same with those of `_turned`."""
-        self._passed_on = scene.photo.linear
-        """What surfaces pass on in the last picture of another light."""
+        self._outgoing = scene.photo.linear
+        """[H, W, 3] outgoing radiance of the surfaces in the last picture of another light."""
         kept = None if file is None else _read(file, self._key)
         self._coarse = kept is None
         if kept is None:
@@ -164,7 +164,7 @@ class Preview:
         if self._turned_tables is None or self._turned_tables[0] is not tables:
             _, cache, guide = self._turned
             fitted = tables is self._tables
-            passed_on = self.scene.photo.linear if fitted else self._passed_on
+            passed_on = self.scene.photo.linear if fitted else self._outgoing
             places = np.searchsorted(self._pixels, cache.pixels)
             # Coarse ones are of one roughness [P].
             roughness = tables.levels[0][places] if len(tables.levels) == 1 else None
@@ -204,9 +204,9 @@ class Preview:
         differs = (picture != base).any(-1)
         changed = changed_pixels(self.scene, edited) & differs
         relit = is_relit(self.scene, edited)
-        left = diffuse_left(self.scene, edited)
-        matt = matt_albedos(self.scene, edited)
-        layers = Layers(base, picture, differs, changed, relit, diffuse=left, matt=matt)
+        kept = diffuse_kept(self.scene, edited)
+        albedos = diffuse_albedos(self.scene, edited)
+        layers = Layers(base, picture, differs, changed, relit, diffuse=kept, albedos=albedos)
         return onto_working(self.scene.photo, layers)
 
     def _seen(self, edited: Scene) -> Scene:
@@ -228,19 +228,19 @@ class Preview:
         Coarse ones are of the scene's own roughness alone.
         """
         if self._other is not None and np.array_equal(edited.envmap, self._other[0]):
-            _, tables, self._passed_on = self._other
+            _, tables, self._outgoing = self._other
             return tables
         # First what surfaces pass on under this light, by few rays, at the roughness that they have; then the picture,
         # by all of them.
-        before = self._passed_on if coarse else None
+        before = self._outgoing if coarse else None
         roughness = edited.materials.roughness.ravel()[self._pixels]
         tables = self._filtered(self._quick, edited.envmap, before, roughness)
-        self._passed_on = self._image(
+        self._outgoing = self._image(
             self._shaded(edited.materials, tables), self._sky(edited.envmap)
         )
         if not coarse:
-            tables = self._filtered(self._cache, edited.envmap, self._passed_on)
-            self._other = (edited.envmap, tables, self._passed_on)
+            tables = self._filtered(self._cache, edited.envmap, self._outgoing)
+            self._other = (edited.envmap, tables, self._outgoing)
         return tables
 
     def _filtered(

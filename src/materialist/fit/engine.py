@@ -47,7 +47,8 @@ From albedo, roughness and metallic [P, 5] of the surface pixels that the second
 class TransportEngine:
     """Shading from cached transport; noise-free, a full-resolution step in tens of milliseconds.
 
-    radiance: [H, W, 3] what the surfaces send to each other where a problem has none of its own: the photograph.
+    radiance: [H, W, 3] outgoing radiance of the surfaces, the source of indirect light where a problem has none of its
+    own: the photograph.
     light_height: rows of the environment map inside the light fit. roughness: [H, W], where the fit leaves it alone.
     """
 

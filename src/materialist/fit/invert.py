@@ -115,7 +115,7 @@ class Fit:
         settings = setup.settings.light
         # --- What surfaces send each other follows the fitted maps from the second fit on ---
         known = state.light is not None
-        problem = self.engine.light_problem(materials, self._sent(state) if known else None)
+        problem = self.engine.light_problem(materials, self._outgoing(state) if known else None)
         # --- The first fit starts a fresh field, a later one moves that field on ---
         if state.light is None:
             begin = start_light(photo, settings, setup.prior.light, problem)
@@ -158,10 +158,10 @@ class Fit:
 
     def material_problem(self, state: FitState) -> MaterialProblem:
         """Rendering as a function of the materials, under the state's light."""
-        return self.engine.material_problem(state.envmap, self._sent(state))
+        return self.engine.material_problem(state.envmap, self._outgoing(state))
 
-    def _sent(self, state: FitState) -> Array | None:
-        """[H, W, 3] what surfaces send to each other; None: what the photo shows.
+    def _outgoing(self, state: FitState) -> Array | None:
+        """[H, W, 3] outgoing radiance of the surfaces, the source of indirect light; None: the photo.
 
         With `traced` bounces, what the path tracer will find with the state's maps and light.
         """

@@ -6,7 +6,7 @@ from materialist.fit.settings import Encoding, Loss, MaterialSettings
 
 
 def encode(radiance: torch.Tensor, encoding: Encoding) -> torch.Tensor:
-    """Radiance as the loss sees it: `linear` (paper), `srgb` (as an eye sees it), `log1p` (paper, HDR)."""
+    """Radiance as the loss sees it: `linear`, `srgb` (display-encoded; both presets) or `log1p` (paper, HDR photos)."""
     if encoding == "linear":
         return radiance
     x = radiance.clamp_min(0)

@@ -67,17 +67,19 @@ def fit_materials(
 
     photo: [P, 3] linear. prior: [P, 5] maps that L_cons holds on to. seed: of the pixels that a step compares.
     """
+    # --- What stays the same in all steps ---
     results = []
     draw = _pixel_draw(len(photo), settings.step_pixels, seed)
     # Powers take most of a step, and these do not change.
     encoded_photo = encode(photo, settings.encoding)
     encoded_albedo = encode(prior[:, :3], settings.encoding)
     for stage in settings.stages:
-        # Maps that the stage does not move stay as the field has them now.
+        # --- Maps that the stage does not move stay as the field has them now ---
         held = {
             name: field().detach()[:, c] for name, c in COLUMNS.items() if name not in stage.targets
         }
 
+        # --- L_re + delta L_cons ---
         def loss(_: int, held=held) -> torch.Tensor:
             rows = draw()
             moved = field(rows)
@@ -85,7 +87,7 @@ def fit_materials(
                 [held[name][rows] if name in held else moved[:, c] for name, c in COLUMNS.items()],
                 1,
             )
-            # L_re on the pixels of this step, plus delta L_cons on the same.
+            # Both on the pixels of this step.
             radiance = problem(values, rows)
             error = encoded_error(
                 radiance,
@@ -103,6 +105,7 @@ def fit_materials(
             if isinstance(base, MaterialMaps):
                 base.maps.clamp_(0, 1)
 
+        # --- Until the stopping rule holds ---
         name = stage.name or ("+".join(stage.targets) if held else "materials")
         run = optimise(
             name,

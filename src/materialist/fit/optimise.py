@@ -119,8 +119,8 @@ def optimise(
 def _stalled(losses: list[float], schedule: Schedule) -> bool:
     """The stopping rule (paper, Implementation Details): whether `patience` steps improved the loss too little.
 
-    With the paper's preset the light ends below 1 % in 100 steps, the materials below 0.5 % in 200; by default patience
-    is 0, which never ends early. Losses are averaged over `averaged` steps, and every tenth step asks.
+    With the paper's preset the light ends below 1 % in 100 steps, the materials below 0.5 % in 200. `--preset default`
+    sets the patience to 0, which never ends early. Losses are averaged over `averaged` steps; every tenth step asks.
     """
     n = schedule.patience
     # A tenth step is soon enough for a rule about 100 or 200 of them.

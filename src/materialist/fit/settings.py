@@ -1,6 +1,7 @@
 """Settings of the fit: what `--preset paper` and `--preset default` mean.
 
-The defaults of the classes are the paper's (Implementation Details), or leave out what the paper does not have.
+The defaults of the classes are the paper's text (Implementation Details). `PAPER` is what `--preset paper` runs: values
+of the published code where the two differ.
 """
 
 import dataclasses

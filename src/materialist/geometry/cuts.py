@@ -18,9 +18,12 @@ class CutSettings:
     # degrees from grazing; a steep slope whose normals face the camera more than this is a smeared edge
     slanted: float = 25.0
     steady: float = 2.0  # factor by which a step may exceed a steady slope, as on a plane
-    bending: float = 3.0  # what a slope that grows towards the pair adds to that factor, times the share it grows by
-    least: float = 0.002  # share of the surface below which a region is a stray; by eye
-    most: float = 5.0  # largest such factor: the last step of a sphere's rim is 4.2 times the least (derived, tau = 6)
+    bending: float = (
+        3.0  # added to that factor for each relative growth of the slope towards the pair
+    )
+    # largest such factor: the last step of a sphere's rim is 4.2 times the least (derived, tau = 6)
+    max_factor: float = 5.0
+    min_region_share: float = 0.002  # of the surface; a smaller region is a stray; by eye
 
 
 SETTINGS = CutSettings()
@@ -92,7 +95,7 @@ def without_strays(cuts: Cuts, depth: Array) -> Cuts:
     values = np.log(np.where(surface, depth, 1)).ravel()
     step = np.abs(values[second] - values[first])
     # --- Strays join a neighbour; back onto the grid ---
-    least = SETTINGS.least * float(surface.sum())
+    least = SETTINGS.min_region_share * float(surface.sum())
     _, linked = regions_without_strays((first, second), linked, step, least, depth.size)
     link_x = np.zeros((height, width - 1), bool)
     link_y = np.zeros((height - 1, width), bool)
@@ -182,6 +185,6 @@ def _exceeds_slope(inverse: Array, surface: Array) -> Array:
         least = np.where(steady, least, 1)
         bending = first * (SETTINGS.steady + SETTINGS.bending * (first / least - 1))
         allowed = np.maximum(
-            allowed, np.where(steady, np.minimum(bending, SETTINGS.most * least), 0)
+            allowed, np.where(steady, np.minimum(bending, SETTINGS.max_factor * least), 0)
         )
     return np.abs(step) > allowed

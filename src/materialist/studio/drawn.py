@@ -16,7 +16,7 @@ import numpy as np
 from materialist.bsdf.disney import DIELECTRIC_R0
 from materialist.color import srgb_levels
 from materialist.edits.composite.into_photo import SETTINGS as COMPOSITE
-from materialist.edits.composite.layers import matt_albedos
+from materialist.edits.composite.layers import diffuse_albedos
 from materialist.edits.core.operation import REGION
 from materialist.edits.insert.operation import INSERT
 from materialist.edits.light.relight import SETTINGS as LAMPS
@@ -205,7 +205,7 @@ def _material(live: LivePreview, drawing: Drawing) -> Made:
         "roughness": materials.roughness,
         "metallic": materials.metallic,
         "fitted_metallic": live.scene.materials.metallic,
-        "matt": matt_albedos(live.scene, live.scene)[0],
+        "matt": diffuse_albedos(live.scene, live.scene)[0],
         "weight": weight,
         "gloss": gloss,
         "paint_shade": shades[0],

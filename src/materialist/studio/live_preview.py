@@ -150,7 +150,7 @@ class LivePreview:
             raise InputError(f"'{step_summary(step)}' cannot be applied. {reason}") from error
 
     def _fallen(self, before: Scene, steps: tuple[Step, ...]) -> Scene:
-        """The scene `before` after the fall that the last step is; what falls, and for how long, is a stranger's."""
+        """The scene `before` after the fall in the last step, simulated in a limited process: meshes are untrusted."""
         limits = Limits(SETTINGS.opening_memory, SETTINGS.fall_seconds)
         place = str(self._package)
         added = run_limited(tasks.fallen, limits, scene=place, steps=steps)

@@ -17,7 +17,7 @@ import mitsuba as mi
 import numpy as np
 import torch
 
-from materialist.bsdf.disney import diffuse_coefficients, schlick
+from materialist.bsdf.disney import diffuse_coefficients, schlick_weight
 from materialist.bsdf.ggx import alpha_of, smith_g1
 from materialist.bsdf.lobes import face_towards, lifted, visible_normal_vector
 from materialist.buffers import floats, integers, placed
@@ -359,7 +359,7 @@ def _added(sums, diffuse: bool, wi, wo, h, alpha, light):
         terms = [c * light for c in diffuse_coefficients(wi.z, wo.z, dr.dot(h, wi))]
     else:
         # f_s cos / pdf of visible normals leaves F G1(wi), and F = C_0 (1 - s) + s by Schlick.
-        fresnel = schlick(dr.dot(h, wo))
+        fresnel = schlick_weight(dr.dot(h, wo))
         weighted = light * smith_g1(wi.z, alpha)
         terms = [(1 - fresnel) * weighted, fresnel * weighted]
     return [total + term for total, term in zip(sums, terms, strict=True)]

@@ -18,7 +18,7 @@ from materialist.bsdf.disney import (
     diffuse_coefficients,
     half_vector_density,
     quadratic,
-    schlick,
+    schlick_weight,
 )
 from materialist.bsdf.ggx import alpha_of, smith_g1
 from materialist.bsdf.lobes import half_vector, lifted, visible_normal_vector
@@ -158,7 +158,7 @@ class LobeRays:
         along = half_vector_density(wo.z, sin2, alpha)  # of mirrored rays
         # Balance heuristic: f / (p_texels + n p_mirrored); of f_s cos the factor F stays out.
         value = smith_g1(wi.z, alpha) * along / (self._density(world) + self.specular * along)
-        fresnel = schlick(cos_d)
+        fresnel = schlick_weight(cos_d)
         return (1 - fresnel) * value, fresnel * value
 
     def _rays(self, world: Any, row: Any, diffuse: Any, specular: tuple[Any, Any]) -> Rays:

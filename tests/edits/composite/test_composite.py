@@ -16,10 +16,10 @@ from materialist.edits.composite import into_photo as into_photo_module
 from materialist.edits.composite.composite import (
     NARROWED,
     composite,
+    composite_in_place,
     developed,
     is_deep,
     pictures,
-    spent_composite,
 )
 from materialist.edits.composite.into_photo import SETTINGS, into_photo, onto_working
 from materialist.edits.composite.layers import Layers, _gain, significance, without_fireflies
@@ -68,12 +68,12 @@ def test_a_photo_that_is_given_up_becomes_the_same_picture():
     filled = removed.photo.original.copy()
     pictures.append(composite(scene, removed, spp=6))
     np.testing.assert_array_equal(removed.photo.original, filled)
-    pictures.append(spent_composite(scene, removed, options))
+    pictures.append(composite_in_place(scene, removed, options))
     assert pictures[1] is removed.photo.original
     np.testing.assert_array_equal(*pictures)
     painted = edit(scene, MASK, albedo=(0.1, 0.2, 0.05))
     np.testing.assert_array_equal(
-        spent_composite(scene, painted, options), composite(scene, painted, spp=6)
+        composite_in_place(scene, painted, options), composite(scene, painted, spp=6)
     )
     np.testing.assert_array_equal(scene.photo.original, before)
 
@@ -127,7 +127,9 @@ def row_of(old, new, gloss=(0, 0, 0, 0)):
     mirrored = np.array(gloss, np.float32)[None, :, None]
     first, second = (np.tile(np.array(paint, np.float32), (1, 4, 1)) for paint in (old, new))
     everywhere = np.ones((1, 4), bool)
-    return Layers(first + mirrored, second + mirrored, everywhere, everywhere, matt=(first, second))
+    return Layers(
+        first + mirrored, second + mirrored, everywhere, everywhere, albedos=(first, second)
+    )
 
 
 def test_a_shade_that_the_fit_lacks_stays():
@@ -139,7 +141,7 @@ def test_a_shade_that_the_fit_lacks_stays():
     np.testing.assert_allclose(out[0, 1], 0.25 * RED, rtol=0.1)
     np.testing.assert_allclose(out[0, 2], 0.5 * RED, rtol=0.1)
     # More light than the fit has is no shade; nor is anything where the surface is the photo's own.
-    additive = onto_working(seen, replace(layers, matt=None))
+    additive = onto_working(seen, replace(layers, albedos=None))
     assert (additive[0, 1] > 2 * 0.25 * RED)[0]
     np.testing.assert_allclose(out[0, 3], additive[0, 3], rtol=1e-6)
     passed_on = replace(layers, edited=layers.base + 0.1, changed=~layers.changed)

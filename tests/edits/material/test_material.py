@@ -9,7 +9,7 @@ from made_meshes import floor_scene
 
 from materialist.camera import unit
 from materialist.color import linear_to_srgb
-from materialist.edits.composite.disclosed import base_scene
+from materialist.edits.composite.base import base_scene
 from materialist.edits.material import normals
 from materialist.edits.material.detail import white_share
 from materialist.edits.material.material import edit, projected, shifted_hsv

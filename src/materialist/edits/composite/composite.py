@@ -1,7 +1,7 @@
 """The edit brought back into the photograph: everything that it does not reach stays as it was taken.
 
-It is photo + (edited - base), of two renderings: `layers.render_layers` has the difference, and `into_photo` lays it on
-the photo.
+`layers.render_layers` renders the scene with and without the edit. `into_photo` lays the change on the photo: under the
+same light it adds the difference of the two renderings, under another light it multiplies by their ratio.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from materialist import metrics
-from materialist.edits.composite.disclosed import base_scene, base_without_shadow
+from materialist.edits.composite.base import base_scene, base_without_shadow
 from materialist.edits.composite.into_photo import into_photo
 from materialist.edits.composite.layers import render_layers
 from materialist.edits.core.notes import PICTURED, is_pictured, warned
@@ -64,7 +64,7 @@ def composite(
     return _Compositor(scene, options, full_render, upscale).picture(edited, last=True)
 
 
-def spent_composite(
+def composite_in_place(
     scene: Scene,
     edited: Scene,
     options: RenderOptions,
@@ -72,7 +72,7 @@ def spent_composite(
     full_render: bool = False,
     upscale: Upscale | None = None,
 ) -> Array:
-    """`composite` of an edit of which no other picture is made: a photo of its own is written over, for the memory."""
+    """`composite`, which may write over the edited scene's own photo, to save memory."""
     compositor = _Compositor(scene, options, full_render, upscale)
     return compositor.picture(edited, last=True, spent=True)
 

@@ -83,7 +83,7 @@ def into_photo(
 
 
 def _change(out: Array, photo: Photo, layers: Layers, tick: Progress) -> None:
-    """The same without the new bodies, in `out` [H0, W0, 3], which holds the photo's own pixels."""
+    """Add the change without the new bodies to `out` [H0, W0, 3] in place, which holds the photo's own pixels."""
     # --- All terms at working size; each side of the border of a replaced surface is a picture of its own ---
     stack = np.concatenate(_terms(photo, layers), -1)  # [H, W, 9]
     stack[~layers.reached, :6] = 0
@@ -234,10 +234,10 @@ def _same_light(photo: Photo, layers: Layers) -> tuple[Array, Array, Array]:
     left = 1.0 if layers.diffuse is None else layers.diffuse[..., None]
     # A brighter surface does not amplify what the fit misses of the photo.
     factor = left * np.minimum((layers.edited + SETTINGS.floor) / (layers.base + SETTINGS.floor), 1)
-    if layers.matt is None:
+    if layers.albedos is None:
         return layers.edited - layers.base, factor - 1, layers.base
     held = photo.linear if photo.hdr else _unclipped(photo.linear, layers.base)
-    shade = missing_shade(held, layers.base, layers.edited, *layers.matt)
+    shade = missing_shade(held, layers.base, layers.edited, *layers.albedos)
     shade = np.where(layers.changed, shade, 1)[..., None]
     shade = 1 + left * (shade - 1)
     return shade * (layers.edited - layers.base), factor - 1, shade * layers.base

@@ -69,7 +69,7 @@ class Layers:
     """New bodies at native size, which stand before all this; under them the maps above go on from what is beside."""
     diffuse: Array | None = None
     """[H, W] in [0, 1]: what new metal leaves of the diffuse light, in which the photo's own texture is; None: all."""
-    matt: tuple[Array, Array] | None = None
+    albedos: tuple[Array, Array] | None = None
     """[H, W, 3] albedo (1 - metallic) of the fitted and the edited scene, to which diffuse light is proportional."""
     covered: Array | None = None
     """[H, W] bool: bodies that only one scene has and `native` has not: the rendering alone is seen; in `changed`."""
@@ -120,21 +120,20 @@ def render_layers(renderer: EditRenderer, edited: Scene, options: RenderOptions)
         relit=relit,
         native=alone,
         covered=covered,
-        diffuse=diffuse_left(scene, edited),
-        matt=matt_albedos(scene, edited),
+        diffuse=diffuse_kept(scene, edited),
+        albedos=diffuse_albedos(scene, edited),
     )
 
 
-def diffuse_left(scene: Scene, edited: Scene) -> Array:
-    """[H, W] in [0, 1]: `Layers.diffuse` of an edit."""
-    # The diffuse lobe has the factor (1 - M).
+def diffuse_kept(scene: Scene, edited: Scene) -> Array:
+    """[H, W] in [0, 1]: the share of the diffuse lobe that an edit keeps, (1 - M_new) / (1 - M_old), at most 1."""
     old = np.maximum(1 - scene.materials.metallic, 1e-3)
     new = np.maximum(1 - edited.materials.metallic, 1e-3)
     return np.minimum(new / old, 1)
 
 
-def matt_albedos(scene: Scene, edited: Scene) -> tuple[Array, Array]:
-    """[H, W, 3] each: `Layers.matt` of an edit."""
+def diffuse_albedos(scene: Scene, edited: Scene) -> tuple[Array, Array]:
+    """[H, W, 3] each: `Layers.albedos` of an edit."""
     first, second = (
         shown.materials.albedo * (1 - shown.materials.metallic[..., None])
         for shown in (scene, edited)

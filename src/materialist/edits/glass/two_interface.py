@@ -59,7 +59,7 @@ class Crossing:
     reflected: Array
     """[N, 3] unit direction of the reflection at the front."""
     reflectance: Array
-    """[N] of the front; what its roughness hides of the reflection stays inside."""
+    """[N] Fresnel reflectance of the front times the masking of the reflection; what is masked stays inside."""
 
 
 def two_interface(
@@ -190,7 +190,7 @@ def cross(
     # --- At the back: x + d1 omega_t1, where omega_t2 leaves ---
     exit_point = front.point + front.way(inner, d1)[:, None] * inner
     outward = front.back_at(exit_point)
-    # A back that the ray does not meet from inside would be no back: it leaves where it grazes.
+    # A ray meets the back from inside: normals that face it are tilted until it grazes.
     against = -_facing(outward, -inner)
     facet = visible_facet(inner, against, alpha, points[2], points[3])
     direction, is_total = refract(inner, facet, 1 / ior)

@@ -25,7 +25,7 @@ class SelectSettings:
 
     min_box_overlap: float = 0.25  # IoU of the object's box with the given one; less: misplaced
     gap: float = 0.015  # half of the gap across which two parts are one
-    # share of the photo from which several clicks must each select half of what they select together
+    # share of the photo: a larger mask of several clicks needs one that alone selects half of it
     most: float = 0.5
 
     # GrabCut: radii around a click; tuned on 54 clicks.
@@ -107,7 +107,7 @@ def _around(scene: Scene, points: Sequence[tuple[int, int]]) -> Array:
 
 
 def _together(scene: Scene, points: Sequence[tuple[int, int]], extent: str) -> Array:
-    """[H, W] logits of the mask at all points. Raises InputError where one off it makes it most of the photo."""
+    """[H, W] logits of the mask at all points. Raises InputError where a stray click makes it most of the photo."""
     outline = _at(scene, points, extent)
     share = (outline > 0).mean()
     if len(points) > 1 and extent == "auto" and share > SETTINGS.most:

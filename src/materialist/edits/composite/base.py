@@ -1,4 +1,4 @@
-"""The scene that an edit is compared with, where it takes an object of the photo away: without the object's shadow."""
+"""The base of the comparison: the scene without the edit, or, after a removal, without the removed object's shadow."""
 
 from dataclasses import replace
 
@@ -31,7 +31,7 @@ def base_scene(scene: Scene, edited: Scene) -> Scene:
     if edited.photo is scene.photo:
         return base
     # --- Inside the hole: the maps that the removal filled in ---
-    hole = _disclosed(scene, edited)
+    hole = _disoccluded(scene, edited)
     old = scene.materials
     new = edited.materials
     materials = Materials(
@@ -75,7 +75,7 @@ def base_without_shadow(
     if base.photo is scene.photo:
         return base
     # --- What the renderings say: the scene with the object, and without it ---
-    hole = _disclosed(scene, edited)
+    hole = _disoccluded(scene, edited)
     photo = base.photo
     # Planes that the rest of the picture suggests when the object is gone were there before.
     before = replace(base_of(scene, edited), geometry=continued_as(scene.geometry, base.geometry))
@@ -108,7 +108,7 @@ def base_without_shadow(
     return replace(base, photo=replace(photo, original=original, linear=linear))
 
 
-def _disclosed(scene: Scene, edited: Scene) -> Array:
+def _disoccluded(scene: Scene, edited: Scene) -> Array:
     """[H, W] bool: where the edit shows what was hidden."""
     hole = (edited.photo.linear != scene.photo.linear).any(-1) | (edited.depth != scene.depth)
     return hole | (edited.rerender != scene.rerender).any(-1)  # white may be filled with white
