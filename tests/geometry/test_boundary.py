@@ -238,3 +238,13 @@ def test_beside_a_smeared_outline_the_surface_has_no_lip():
     front = mesh.faces[: 2 * depth.size].reshape(8, 32, 6)
     nearest = -mesh.vertices[front][..., 2].max(-1).max(0)  # [32] of each column of pixels
     assert (np.diff(nearest) > -1e-6).all()
+
+
+def test_a_wall_seen_through_a_small_hole_is_no_part_of_what_has_the_hole():
+    """As in a jug's handle: a sheet between them would shade the wall."""
+    depth = np.full((100, 100), 10.0, np.float32)
+    depth[40:49, 40:49] = 5
+    depth[43:46, 43:46] = 10
+    mesh, _ = mesh_of(depth)
+    far = mesh.vertices[mesh.faces][..., 2] < -7.5
+    assert (far.all(-1) | ~far.any(-1)).all()

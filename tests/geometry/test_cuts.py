@@ -5,7 +5,7 @@ import pytest
 from geometry_scenes import plane_depth, sphere_depth
 from scipy import ndimage
 
-from materialist.geometry.cuts import find_cuts, without_strays
+from materialist.geometry.cuts import find_cuts
 from materialist.types import Camera
 
 CAMERA = Camera(96, 64, 50.0)
@@ -84,22 +84,3 @@ def test_smeared_edges_part_when_the_normals_say_that_nothing_is_slanted(width, 
         if smear == 7 and width >= 7:  # by depth alone, this is a slanted surface
             for normal in (None, sideways):
                 assert not find_cuts(1 / smeared, camera, tau, normal).cut_x.any()
-
-
-@pytest.mark.parametrize(("slope", "joined"), [(12, True), (24, False), (-24, False)])
-def test_a_stray_joins_across_a_small_step_only(slope, joined):
-    """A fleck of 3 x 3 pixels on a wall, and one that lies far before or behind it, as a wall seen through a handle."""
-    depth = np.full((64, 96), 10.0, np.float32)
-    depth[30:33, 40:43] *= np.exp(slope / CAMERA.focal)
-    cuts = find_cuts(depth, CAMERA, 6.0)
-    assert cuts.cut_x.sum() == 6 and cuts.cut_y.sum() == 6
-    left = without_strays(cuts, depth, CAMERA)
-    assert (left.cut_x.sum() + left.cut_y.sum() == 0) == joined
-
-
-def test_what_is_no_stray_stays_cut_off():
-    depth = np.full((64, 96), 10.0, np.float32)
-    depth[20:50, 30:60] *= np.exp(12 / CAMERA.focal)
-    cuts = find_cuts(depth, CAMERA, 6.0)
-    left = without_strays(cuts, depth, CAMERA)
-    assert left.cut_x.sum() == cuts.cut_x.sum() == 60

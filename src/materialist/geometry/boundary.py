@@ -14,7 +14,7 @@ import numpy as np
 
 from materialist.camera import rays_through
 from materialist.errors import InputError
-from materialist.geometry.cuts import Cuts, find_cuts, without_strays
+from materialist.geometry.cuts import Cuts, find_cuts
 from materialist.types import Array, Camera, Mesh
 
 
@@ -69,7 +69,7 @@ def depth_to_mesh(depth: Array, normal: Array, camera: Camera, *, tau: float = 6
         raise InputError(
             f"The grazing angle tau is {tau} degrees; choose one between 0 and 90 (the paper uses 6)."
         )
-    cuts = without_strays(find_cuts(depth, camera, tau, normal), depth, camera)
+    cuts = find_cuts(depth, camera, tau, normal)
     # Inverse depth, 1 / scene unit: [H, W] of the pixels, and [H, W, 4] at their corners.
     inverse = np.where(depth > 0, 1 / np.where(depth > 0, depth, 1), 0).astype(np.float64)
     reach = corner_inverse_depth(inverse, cuts)

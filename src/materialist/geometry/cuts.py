@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from materialist.camera import unit, unproject
-from materialist.geometry.regions import regions_without_strays
 from materialist.types import Array, Camera
 
 
@@ -23,9 +22,6 @@ class CutSettings:
     )
     # largest such factor: the last step of a sphere's rim is 4.2 times the least (derived, tau = 6)
     max_factor: float = 5.0
-    min_region_share: float = 0.002  # of the surface; a smaller region is a stray; by eye
-    # tangent of the slope up to which a stray is joined, 10 where cuts begin: steeper sheets cast shadows; 27 photos
-    max_stray_slope: float = 16.0
 
 
 SETTINGS = CutSettings()
@@ -77,36 +73,6 @@ def find_cuts(depth: Array, camera: Camera, tau: float, normal: Array | None = N
     cut_x = pair_x & grazing_x & steep_x
     cut_y = pair_y & grazing_y & steep_y
     return Cuts(pair_x & ~cut_x, pair_y & ~cut_y, cut_x, cut_y)
-
-
-def without_strays(cuts: Cuts, depth: Array, camera: Camera) -> Cuts:
-    """The cuts without those that part a stray from what it fits best in depth, where the step between them is small.
-
-    depth: [H, W] planar, 0 = no surface. Strays are regions below `CutSettings.min_region_share`: flecks on slopes and
-    the blurred rims of things, each of which would be a rag of its own in mirrors and shadows. What lies far from its
-    neighbours, as a wall seen through a handle, stays a piece.
-    """
-    height, width = depth.shape
-    surface = depth > 0
-    # --- Neighbours as a graph: both pixels, whether linked, step in log depth ---
-    index = np.arange(depth.size).reshape(depth.shape)
-    across = cuts.link_x | cuts.cut_x
-    down = cuts.link_y | cuts.cut_y
-    first = np.concatenate([index[:, :-1][across], index[:-1][down]])
-    second = np.concatenate([index[:, 1:][across], index[1:][down]])
-    linked = np.concatenate([cuts.link_x[across], cuts.link_y[down]])
-    values = np.log(np.where(surface, depth, 1)).ravel()
-    step = np.abs(values[second] - values[first])
-    # --- Strays join a neighbour across small steps; back onto the grid ---
-    least = SETTINGS.min_region_share * float(surface.sum())
-    _, joined = regions_without_strays((first, second), linked, step, least, depth.size)
-    linked |= joined & (step * camera.focal < SETTINGS.max_stray_slope)
-    link_x = np.zeros((height, width - 1), bool)
-    link_y = np.zeros((height - 1, width), bool)
-    count = int(across.sum())
-    link_x[across] = linked[:count]
-    link_y[down] = linked[count:]
-    return Cuts(link_x, link_y, across & ~link_x, down & ~link_y)
 
 
 def _grazing_pairs(points: Array, surface: Array, tau: float) -> tuple[Array, Array]:
