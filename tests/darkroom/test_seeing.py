@@ -10,7 +10,7 @@ from PIL import Image
 from studio_scenes import HEIGHT, WIDTH
 
 from materialist.darkroom import state
-from materialist.studio import views
+from materialist.studio.live import views
 
 
 def mesh(client):

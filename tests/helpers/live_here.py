@@ -1,4 +1,4 @@
-"""`studio.live.Live` without a process of its own, which takes seconds to start.
+"""`studio.live.process.Live` without a process of its own, which takes seconds to start.
 
 `live_here`: within the tests' process, which has loaded torch already. `live_nowhere`: the photo alone, without edits.
 """
@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from materialist.io.package import load_scene
-from materialist.studio.live import Live
-from materialist.studio.live_preview import LivePreview
+from materialist.studio.live.preview import LivePreview
+from materialist.studio.live.process import Live
 
 
 class LiveHere(Live):
@@ -47,7 +47,7 @@ def _in_place(double):
         patch.setattr("materialist.studio.session.Live", double)
         # Nor does one get ready for the next photo, or for glass, at whatever is selected.
         patch.setattr("materialist.studio.studio.warmed", lambda device: None)
-        patch.setattr("materialist.studio.glass.GlassClient.get_ready", lambda self: None)
+        patch.setattr("materialist.studio.live.glass.GlassClient.get_ready", lambda self: None)
         yield
 
 

@@ -88,13 +88,13 @@ def numbers(report, count):
 
 
 def open_without_pictures(report, package, file, device):
-    """In place of `studio.live.open_preview`: a preview that applies edits, and shades nothing."""
+    """In place of `studio.live.process.open_preview`: a preview that applies edits, and shades nothing."""
     from concurrent.futures import ThreadPoolExecutor
 
     from materialist.io.package import load_scene
-    from materialist.studio import live, live_preview
+    from materialist.studio.live import preview, process
 
-    live_preview._THREAD = ThreadPoolExecutor(1)
-    live_preview._build = lambda scene, file: None
-    live._OPENED.set_result(live_preview.LivePreview(load_scene(package), None, Path(package)))
+    preview._THREAD = ThreadPoolExecutor(1)
+    preview._build = lambda scene, file: None
+    process._OPENED.set_result(preview.LivePreview(load_scene(package), None, Path(package)))
     report.intermediate(fine=True)

@@ -1,4 +1,4 @@
-"""A stand-in for `studio.glass.trace`, as worker processes load it by name."""
+"""A stand-in for `studio.live.glass.trace`, as worker processes load it by name."""
 
 import os
 import time
@@ -6,7 +6,7 @@ import time
 import numpy as np
 
 from materialist.errors import InputError
-from materialist.studio.glass import Pane
+from materialist.studio.live.glass import Pane
 
 
 def trace(report, scene, others, step):

@@ -10,7 +10,7 @@ from studio_scenes import block, room
 from materialist.edits.select.objects import overlap
 from materialist.edits.select.select import select
 from materialist.errors import InputError
-from materialist.studio.live import PreviewLost
+from materialist.studio.live.process import PreviewLost
 from materialist.studio.selection import Selection
 
 CHOOSE = partial(select, room())

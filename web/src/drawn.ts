@@ -277,7 +277,7 @@ class Lamps {
     this.under = pixels(block);
   }
 
-  /** All lamps on the surfaces, without shadows: `studio.sketch.light_lamps`. */
+  /** All lamps on the surfaces, without shadows: `studio.live.sketch.light_lamps`. */
   draw(lamps: number[][], out: ImageData): void {
     const { header, arrays } = this.block;
     const [width, height] = header.size as [number, number];

@@ -12,8 +12,9 @@ from materialist.edits.light import presets
 from materialist.edits.registry import OPERATIONS
 from materialist.errors import InputError
 from materialist.option_kinds import declarations
-from materialist.studio import objects, reopening, uploads, views
+from materialist.studio import objects, reopening, uploads
 from materialist.studio.lights import change_lamp, light_file, number_text, place_lamp
+from materialist.studio.live import views
 from materialist.studio.session import Session
 
 State = dict[str, Any]

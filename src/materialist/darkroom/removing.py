@@ -8,9 +8,10 @@ from materialist.darkroom.desk import Desk, Followed
 from materialist.edits.recipe import Step, options_of
 from materialist.edits.remove.operation import REMOVE
 from materialist.jobs.worker import DONE
-from materialist.studio import tasks, views
+from materialist.studio import tasks
 from materialist.studio.edit_list import EditList, with_options
-from materialist.studio.live import Live
+from materialist.studio.live import views
+from materialist.studio.live.process import Live
 from materialist.studio.session import Session
 
 

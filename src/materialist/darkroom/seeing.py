@@ -7,7 +7,7 @@ from materialist.darkroom import requests
 from materialist.darkroom.desk import Desk
 from materialist.edits.core.operation import Target
 from materialist.errors import InputError
-from materialist.studio import views
+from materialist.studio.live import views
 
 FULL_SIDE = 8192
 """Longest side of the photo's own pixels, which is the largest picture that graphics cards are sure to take."""

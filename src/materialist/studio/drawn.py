@@ -1,7 +1,7 @@
 """What a page needs to draw a change itself, before the server's picture: of a material, an object, and lamps.
 
 Each kind is one block of bytes that stays good as long as its key does: a slider or a drag asks for nothing. The page
-draws them by the formulas of `edits.preview` and `studio.sketch`; a test in a browser compares the pictures.
+draws them by the formulas of `edits.preview` and `studio.live.sketch`; a test in a browser compares the pictures.
 """
 
 import hashlib
@@ -28,12 +28,13 @@ from materialist.edits.material.operation import EDIT
 from materialist.edits.recipe import Step, options_of
 from materialist.geometry.silhouette import window
 from materialist.io import display
-from materialist.studio import SETTINGS, glass
+from materialist.studio import SETTINGS
 from materialist.studio.edit_list import key_of, with_options
-from materialist.studio.live import Live
-from materialist.studio.live_preview import LivePreview
+from materialist.studio.live import glass
+from materialist.studio.live.preview import LivePreview
+from materialist.studio.live.process import Live
+from materialist.studio.live.sketch import draw_bodies
 from materialist.studio.session import Session
-from materialist.studio.sketch import draw_bodies
 from materialist.types import Array, Materials, Scene
 
 MOVED = ("hue", "saturation", "value", "albedo", "roughness", "metallic")
@@ -98,7 +99,7 @@ def content(session: Session, kind: str) -> bytes | None:
 def block(
     live: LivePreview, kind: str, drawing: Drawing, key: str, steps: tuple[Step, ...]
 ) -> bytes | None:
-    """The bytes of a kind of change in a list of edits, `steps`; a call of `studio.live`."""
+    """The bytes of a kind of change in a list of edits, `steps`; a call of `studio.live.process`."""
     made = KINDS[kind](live, drawing)
     if made is None:
         return None

@@ -12,7 +12,7 @@ from materialist.edits.recipe import Step
 from materialist.edits.registry import OPERATIONS
 from materialist.errors import InputError
 from materialist.io.atomic import whole_file
-from materialist.studio import views
+from materialist.studio.live import views
 from materialist.studio.session import Session
 
 KINDS = tuple(name for name, entry in OPERATIONS.items() if entry.target is Target.PLACE)

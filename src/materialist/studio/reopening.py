@@ -8,7 +8,7 @@ from materialist.camera import project
 from materialist.edits.core.operation import Target
 from materialist.edits.recipe import Step, region_of
 from materialist.errors import MaterialistError
-from materialist.studio.live_preview import LivePreview
+from materialist.studio.live.preview import LivePreview
 from materialist.types import Array, Body
 
 
@@ -18,7 +18,7 @@ def edit_at(
     """The place in the list of the edit that a click at a pixel means; None for none, and for the current one.
 
     What stands in front comes first: objects, then regions, each the latest first. A second click on the thing of the
-    current edit selects as ever. It is a call of `studio.live`.
+    current edit selects as ever. It is a call of `studio.live.process`.
     """
     candidates: list[tuple[bool, int]] = []
     for index, step in enumerate(listed):

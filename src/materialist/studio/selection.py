@@ -12,7 +12,7 @@ import numpy as np
 from materialist.edits.select.extents import LARGER, next_region
 from materialist.edits.select.parts import piece_at
 from materialist.errors import InputError
-from materialist.studio.live import PreviewLost
+from materialist.studio.live.process import PreviewLost
 from materialist.types import Array, Scene
 
 ADD = "add"

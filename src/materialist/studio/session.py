@@ -13,14 +13,15 @@ from materialist.edits.recipe import Step, options_of, write_recipe
 from materialist.errors import InputError, OutputError
 from materialist.jobs.process import Worker
 from materialist.jobs.queue import Job, JobQueue
-from materialist.studio import SETTINGS, uploads, views
+from materialist.studio import SETTINGS, uploads
 from materialist.studio.access.quota import Allowance
 from materialist.studio.archives import read_list, unpack
 from materialist.studio.edit_list import EditList, slides, with_options
 from materialist.studio.finals import FinalPicture, kept_final, sweep_finals
-from materialist.studio.glass import GlassClient
 from materialist.studio.history import History, read_history, write_history
-from materialist.studio.live import Live
+from materialist.studio.live import views
+from materialist.studio.live.glass import GlassClient
+from materialist.studio.live.process import Live
 from materialist.studio.selection import ADD, REMOVE, Selection
 from materialist.studio.workspace import Project, content_of, located, read_steps, write_mask
 from materialist.types import Scene

@@ -8,9 +8,9 @@ from typing import Any
 from materialist.edits.recipe import Step
 from materialist.errors import MaterialistError
 from materialist.jobs.queue import Job
-from materialist.studio import glass, views
 from materialist.studio.edit_list import EditList, is_shaded
-from materialist.studio.live import PreviewLost
+from materialist.studio.live import glass, views
+from materialist.studio.live.process import PreviewLost
 from materialist.studio.selection import data_url
 from materialist.studio.session import EDITS, Session
 from materialist.studio.tasks import before_of

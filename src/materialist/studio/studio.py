@@ -26,7 +26,7 @@ from materialist.memory import give_back
 from materialist.studio import SETTINGS, archives, tasks, uploads
 from materialist.studio.access.files import HandedFiles
 from materialist.studio.access.quota import Allowance, Claim, Quota, sender_of
-from materialist.studio.live import warmed
+from materialist.studio.live.process import warmed
 from materialist.studio.page import Page
 from materialist.studio.session import ENDING, Session
 from materialist.studio.workspace import GONE, LOST, Project, WorkFolder, person_of

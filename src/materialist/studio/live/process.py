@@ -21,9 +21,10 @@ from materialist.io.package import load_scene, with_rerender
 from materialist.jobs.process import LOST, Message, Worker, sentence
 from materialist.jobs.worker import DONE, FAILED, INTERMEDIATE, Reporter
 from materialist.memory import give_back
-from materialist.studio import SETTINGS, views
+from materialist.studio import SETTINGS
 from materialist.studio.access.quota import Allowance
 from materialist.studio.edit_list import key_of
+from materialist.studio.live import views
 from materialist.types import Array, Scene
 
 Steps = tuple[Step, ...]
@@ -268,14 +269,14 @@ _OPENED: Future[Any] = Future()
 
 def load(report: Reporter, device: str) -> None:
     """Load what previews need."""
-    from materialist.studio.live_preview import load_renderer
+    from materialist.studio.live.preview import load_renderer
 
     load_renderer(device)
 
 
 def open_preview(report: Reporter, package: str, file: str, device: str) -> None:
     """Open a scene, once in a process; reports `fine` when there are pictures, and again when those are fine."""
-    from materialist.studio.live_preview import LivePreview, load_renderer
+    from materialist.studio.live.preview import LivePreview, load_renderer
 
     try:
         if device != "auto":

@@ -1,6 +1,6 @@
 """Pictures of a scene while a slider moves: `edits.preview.Preview` on its thread, and sketches of what it lacks.
 
-It lives in a process of its own, which `studio.live` starts and asks.
+It lives in a process of its own, which `studio.live.process` starts and asks.
 """
 
 import threading
@@ -27,9 +27,10 @@ from materialist.geometry.membrane import nearest
 from materialist.io.package import with_rerender
 from materialist.jobs.limited import Limits, run_limited
 from materialist.option_kinds import Colour
-from materialist.studio import SETTINGS, glass, tasks
+from materialist.studio import SETTINGS, tasks
 from materialist.studio.edit_list import is_shaded, kept, key_of, step_summary
-from materialist.studio.sketch import draw_bodies, light_lamps
+from materialist.studio.live import glass
+from materialist.studio.live.sketch import draw_bodies, light_lamps
 from materialist.types import Array, Scene
 
 REACH = 0.01

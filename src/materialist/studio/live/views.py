@@ -1,4 +1,7 @@
-"""What is made of a live preview, in its process: pictures, meshes, maps, words. Each is a call of `studio.live`."""
+"""What is made of a live preview, in its process: pictures, meshes, maps, words.
+
+Each is a call of `studio.live.process`.
+"""
 
 import json
 from contextlib import suppress
@@ -15,8 +18,8 @@ from materialist.edits.select.select import select
 from materialist.errors import InputError, MaterialistError
 from materialist.io import display
 from materialist.studio import SETTINGS
-from materialist.studio.glass import Panes
-from materialist.studio.live_preview import LivePreview
+from materialist.studio.live.glass import Panes
+from materialist.studio.live.preview import LivePreview
 from materialist.studio.reporting import named_maps, quality
 from materialist.types import Array, Body, Scene
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 from studio_scenes import room
 
-from materialist.studio.live_preview import lit_as_around
-from materialist.studio.sketch import draw_bodies, light_lamps
+from materialist.studio.live.preview import lit_as_around
+from materialist.studio.live.sketch import draw_bodies, light_lamps
 from materialist.types import Body, Lamp, Surface
 
 SQUARE = np.float32([[-0.3, -0.3, -1], [0.3, -0.3, -1], [0.3, 0.3, -1], [-0.3, 0.3, -1]])

@@ -12,9 +12,9 @@ from studio_scenes import block, package
 
 from materialist.edits.recipe import Step
 from materialist.errors import InputError
-from materialist.studio import views
 from materialist.studio.access.quota import Allowance, Quota
-from materialist.studio.live import Live
+from materialist.studio.live import views
+from materialist.studio.live.process import Live
 from materialist.studio.workspace import write_mask
 
 
@@ -57,7 +57,9 @@ def test_the_process_answers_and_ends_with_the_photo(live, step, tmp_path):
 @pytest.mark.slow
 def test_a_process_that_is_gone_is_replaced(monkeypatch, request, quota, tmp_path):
     """Whatever it is asked: here it loads no torch, which takes longer than all else."""
-    monkeypatch.setattr("materialist.studio.live.open_preview", made_tasks.open_without_pictures)
+    monkeypatch.setattr(
+        "materialist.studio.live.process.open_preview", made_tasks.open_without_pictures
+    )
     live = request.getfixturevalue("live")
     step = request.getfixturevalue("step")
     live.wait()

@@ -12,8 +12,8 @@ from materialist.edits.glass.glass_preview import GlassPreview
 from materialist.edits.recipe import Step
 from materialist.errors import InputError
 from materialist.jobs.worker import Reporter
-from materialist.studio import glass as studio_glass
-from materialist.studio.glass import GlassClient
+from materialist.studio.live import glass as studio_glass
+from materialist.studio.live.glass import GlassClient
 from materialist.studio.workspace import write_mask
 
 

@@ -9,7 +9,8 @@ from made_meshes import box_file
 from materialist.edits.material.material import edit
 from materialist.edits.recipe import Step
 from materialist.errors import InputError
-from materialist.studio import drawn, live_preview
+from materialist.studio import drawn
+from materialist.studio.live import preview
 from materialist.studio.workspace import write_mask
 
 
@@ -19,9 +20,9 @@ def test_metal_with_normals_of_its_outline_is_shaded_with_all_other_steps(tmp_pa
     def build(*_):
         raise InputError("Nothing is shaded here.")
 
-    monkeypatch.setattr(live_preview, "_build", build)
+    monkeypatch.setattr(preview, "_build", build)
     scene, number = balls(((-0.3, -0.2, -3), 0.4))
-    live = live_preview.LivePreview(scene)
+    live = preview.LivePreview(scene)
     mask = write_mask(tmp_path, number == 0)
     metal = Step("edit", {"mask": mask, "metallic": "1"}, tmp_path)
     box = str(box_file(tmp_path / "box.ply"))
@@ -35,7 +36,7 @@ def test_what_the_page_shades_of_metal_is_what_is_shaded_here(tmp_path):
     """Before the edit is metal the page asks for the tables of its outline, as it moves the slider."""
     scene, number = balls(((-0.3, -0.2, -3), 0.4))
     ball = number == 0
-    live = live_preview.LivePreview(scene)
+    live = preview.LivePreview(scene)
     live.prepared.wait(60)
     metal = Step("edit", {"mask": write_mask(tmp_path, ball), "metallic": "1"}, tmp_path)
     before = live.rows((), ball)["specular"]
