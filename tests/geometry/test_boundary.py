@@ -240,6 +240,16 @@ def test_beside_a_smeared_outline_the_surface_has_no_lip():
     assert (np.diff(nearest) > -1e-6).all()
 
 
+@pytest.mark.parametrize("slope", [12, -12, 40])
+def test_a_small_region_is_a_piece_of_its_own_however_small_the_step(slope):
+    camera = Camera(100, 100, 40.0)
+    depth = np.full((100, 100), 10.0)
+    depth[43:46, 43:46] *= np.exp(slope / camera.focal)
+    mesh = depth_to_mesh(depth, towards(depth.shape), camera)
+    z = mesh.vertices[mesh.faces[: 2 * depth.size]][..., 2]
+    assert np.ptp(z, axis=1).max() < 1e-4
+
+
 def test_a_wall_seen_through_a_small_hole_is_no_part_of_what_has_the_hole():
     """As in a jug's handle: a sheet between them would shade the wall."""
     depth = np.full((100, 100), 10.0, np.float32)

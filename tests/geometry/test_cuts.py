@@ -35,6 +35,17 @@ def test_a_plane_at_grazing_angle_is_whole(degrees, turn):
     assert not cuts.cut_x.any() and not cuts.cut_y.any()
 
 
+@pytest.mark.parametrize("tau", [30.0, 60.0, 85.0])
+def test_a_plane_with_its_normals_is_whole_by_any_tau(tau):
+    camera = Camera(64, 48, 40.0)
+    for normal in ([-1.0, 0.0, 1.0], [0.0, 0.0, 1.0]):
+        normal = np.array(normal) / np.linalg.norm(normal)
+        depth = plane_depth(camera, normal, -4.0)
+        cuts = find_cuts(depth, camera, tau, np.broadcast_to(normal, (*depth.shape, 3)))
+        assert not cuts.cut_x.any()
+        assert not cuts.cut_y.any()
+
+
 @pytest.mark.parametrize(("pixels", "shift"), [(6, 0.13), (12, 0.0), (45, 0.37)])
 def test_a_sphere_is_cut_off_all_round_but_not_cracked(pixels, shift):
     camera = Camera(100, 100, 40.0)
@@ -81,6 +92,8 @@ def test_smeared_edges_part_when_the_normals_say_that_nothing_is_slanted(width, 
         step = np.abs(np.diff(smeared[8]))
         cut = find_cuts(1 / smeared, camera, tau, facing).cut_x[8]
         np.testing.assert_array_equal(cut, step > 1e-9)
+        upright = find_cuts(1 / smeared.T, Camera(16, 256, 1.13), tau, facing.transpose(1, 0, 2))
+        np.testing.assert_array_equal(upright.cut_y[:, 8], step > 1e-9)
         if smear == 7 and width >= 7:  # by depth alone, this is a slanted surface
             for normal in (None, sideways):
                 assert not find_cuts(1 / smeared, camera, tau, normal).cut_x.any()

@@ -62,9 +62,9 @@ def find_cuts(depth: Array, camera: Camera, tau: float, normal: Array | None = N
     # --- Condition 3: steeper than the surface beside, or than the normals admit ---
     slanted = np.ones(depth.shape, bool)
     if normal is not None:
-        slanted = np.abs((unit(normal) * unit(points)).sum(-1)) <= np.sin(
-            np.radians(SETTINGS.slanted)
-        )
+        # A plane whose edges a large tau takes for grazing is slanted, too.
+        most = np.radians(min(90, max(SETTINGS.slanted, np.sqrt(2) * tau)))
+        slanted = np.abs((unit(normal) * unit(points)).sum(-1)) <= np.sin(most)
     steep_x = _exceeds_slope(inverse, surface) | ~(slanted[:, :-1] | slanted[:, 1:])
     steep_y = _exceeds_slope(inverse.T, surface.T).T | ~(slanted[:-1] | slanted[1:])
     # --- Cut where all three hold, linked elsewhere ---

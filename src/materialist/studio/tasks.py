@@ -176,7 +176,7 @@ def removal(report: Reporter, scene: str, steps: Steps, fillings: str) -> None:
     """
     from materialist.edits.recipe import apply, options_of, region_of
     from materialist.edits.remove.filling import remembered
-    from materialist.edits.remove.remove import disclosed
+    from materialist.edits.remove.remove import disocclusion
 
     report("load", 0, 1)
     loaded = mt.load_scene(scene)
@@ -184,7 +184,7 @@ def removal(report: Reporter, scene: str, steps: Steps, fillings: str) -> None:
         before = apply(loaded, _surface_steps(steps[:-1]))
         report("removal", 0, 1)
         step = steps[-1]
-        disclosed(before, region_of(loaded, step), options_of(step), loaded)
+        disocclusion(before, region_of(loaded, step), options_of(step), loaded)
 
 
 def _surface_steps(steps: Steps) -> list[Step]:

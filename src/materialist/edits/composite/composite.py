@@ -1,7 +1,8 @@
 """The edit brought back into the photograph: everything that it does not reach stays as it was taken.
 
 `layers.render_layers` renders the scene with and without the edit. `into_photo` lays the change on the photo: under the
-same light it adds the difference of the two renderings, under another light it multiplies by their ratio.
+same light it adds their difference and dims what the fit missed (`_same_light`), under another light it multiplies by
+their ratio.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -181,7 +182,7 @@ def _same_base(scene: Scene, first: Scene, second: Scene) -> bool:
         return False
     if dimmed_emitters(scene, first) != dimmed_emitters(scene, second):
         return False
-    # A photo of its own shows what a removal disclosed: then maps and geometry count, too.
+    # A photo of its own shows what a removal disoccludes: then maps and geometry count, too.
     return first.photo is scene.photo or (
         first.geometry is second.geometry and first.materials is second.materials
     )

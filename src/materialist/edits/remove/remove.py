@@ -49,7 +49,7 @@ def remove(
     # --- The hole, the surfaces behind it, and a picture of them ---
     options = Removal.merged(options, **values)
     fitted = fitted or scene
-    hole, hidden, (picture, method, warnings) = disclosed(scene, mask, options, fitted)
+    hole, hidden, (picture, method, warnings) = disocclusion(scene, mask, options, fitted)
     # --- The photo, maps and re-rendering are filled alike ---
     photo = with_hole(scene.photo, picture, hole.painted)
     old = scene.materials
@@ -84,7 +84,7 @@ def remove(
     return noted(warned(removed, *warnings), "remove", facts)
 
 
-def disclosed(
+def disocclusion(
     scene: Scene, mask: Array, options: Removal, fitted: Scene
 ) -> tuple[Hole, HiddenGeometry, tuple[Array, str, list[str]]]:
     """The hole that a removal leaves, the surfaces behind it, and what `picture_behind` gives: most of its work."""
