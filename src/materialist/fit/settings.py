@@ -144,7 +144,7 @@ PAPER = FitSettings(
         encoding="srgb",
         loss="balanced",
         delta=0.1,
-        step_pixels=1024,
+        step_pixels=4096,
         stages=(
             MaterialStage(("roughness", "metallic"), _MATERIAL),
             MaterialStage(("albedo", "roughness", "metallic"), _MATERIAL),
