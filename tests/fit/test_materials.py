@@ -4,14 +4,15 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pytest
 import torch
 from scipy.optimize import minimize_scalar
 
 from materialist.color import CLIPPED
-from materialist.fit.fields import MaterialMaps
+from materialist.fit.fields import ALL, MaterialMaps
 from materialist.fit.losses import encode
 from materialist.fit.materials import fit_materials
-from materialist.fit.settings import DEFAULT, MaterialStage, Schedule
+from materialist.fit.settings import DEFAULT, MaterialSettings, MaterialStage, Schedule
 
 WEIGHT = 0.7
 
@@ -74,3 +75,26 @@ def test_few_pixels_a_step_find_what_all_find():
     by_some = fitted(light, photo, prior, step_pixels=20)
     assert float((by_all - prior).abs().max()) > 0.1
     torch.testing.assert_close(by_some, by_all, atol=0.03, rtol=0)
+
+
+@pytest.mark.parametrize(("count", "seen"), [(100, 100), (3200, 400), (16000, 1000)])
+def test_a_step_sees_a_share_of_the_pixels_and_a_least_number_of_them(count, seen):
+    settings = MaterialSettings(step_pixels=400, step_share=1 / 16)
+    sizes = []
+
+    class Seen(MaterialMaps):
+        def forward(self, rows=ALL):
+            values = super().forward(rows)
+            sizes.append(len(values))
+            return values
+
+    prior = torch.full((count, 5), 0.5)
+    stage = MaterialStage(("albedo", "roughness", "metallic"), Schedule(max_steps=1))
+    fit_materials(
+        lambda maps, rows: maps[:, :3],
+        prior[:, :3],
+        Seen(prior),
+        prior,
+        replace(settings, stages=(stage,)),
+    )
+    assert sizes[-1] == seen

@@ -69,7 +69,7 @@ def fit_materials(
     """
     # --- What stays the same in all steps ---
     results = []
-    draw = _pixel_draw(len(photo), settings.step_pixels, seed)
+    draw = _pixel_draw(len(photo), settings, seed)
     # Powers take most of a step, and these do not change.
     encoded_photo = encode(photo, settings.encoding)
     encoded_albedo = encode(prior[:, :3], settings.encoding)
@@ -120,9 +120,10 @@ def fit_materials(
     return results
 
 
-def _pixel_draw(count: int, most: int, seed: int) -> Callable[[], Rows]:
-    """What names the pixels of a step: all of `count`, or `most` of them at random."""
-    if not most or count <= most:
+def _pixel_draw(count: int, settings: MaterialSettings, seed: int) -> Callable[[], Rows]:
+    """What names the pixels of a step: all of `count`, or some at random (`step_pixels`, `step_share`)."""
+    most = max(settings.step_pixels, round(settings.step_share * count))
+    if not settings.step_pixels or count <= most:
         return lambda: ALL
     rng = np.random.default_rng(seed)
     return lambda: placed(rng.integers(count, size=most))

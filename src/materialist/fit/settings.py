@@ -86,7 +86,9 @@ class MaterialSettings:
     # paper; of the rendering. `l2`: leaving the prior costs its encoded square, too
     loss: Loss = "l1+l2"
     white: float = math.inf
-    step_pixels: int = 0  # pixels that a step with cached transport compares, drawn anew; 0: all
+    # pixels that a step with cached transport compares, drawn anew; 0: all
+    step_pixels: int = 0
+    step_share: float = 0.0  # the same as a share of all, where that is more
     delta: float = 0.5  # paper; scale of L_cons
     weights: tuple[float, float, float] = (1.0, 1.0, 1.0)  # paper; in L_cons
     stages: tuple[MaterialStage, ...] = ()
@@ -145,6 +147,7 @@ PAPER = FitSettings(
         loss="balanced",
         delta=0.1,
         step_pixels=4096,
+        step_share=1 / 16,
         stages=(
             MaterialStage(("roughness", "metallic"), _MATERIAL),
             MaterialStage(("albedo", "roughness", "metallic"), _MATERIAL),
