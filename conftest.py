@@ -140,6 +140,16 @@ def filled_smoothly(monkeypatch):
     monkeypatch.setattr(filling, "_kept", spanned)
 
 
+@pytest.fixture
+def one_answer(monkeypatch):
+    """The filling network answers once, where four answers, to mirror images too, take seconds."""
+    from dataclasses import replace
+
+    from materialist.edits.remove import filling
+
+    monkeypatch.setattr(filling, "SETTINGS", replace(filling.SETTINGS, mirrored=((),)))
+
+
 @pytest.fixture(scope="session")
 def clicked():
     """The masks of `clicks_once`."""

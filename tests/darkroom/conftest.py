@@ -87,6 +87,9 @@ def client(local):
     session._past = []
     session.final = None
     session.save()
+    # A test before this one may have opened a photo whose preview is still being built.
+    if session.live is not None:
+        session.live.wait()
     return local
 
 

@@ -1,7 +1,5 @@
 """Filling by MI-GAN: surfaces go on through the hole, and nothing is guessed from what may not be seen."""
 
-from dataclasses import replace
-
 import cv2
 import numpy as np
 import pytest
@@ -41,13 +39,7 @@ def blurred(monkeypatch):
     monkeypatch.setattr(filling, "run", network)
 
 
-@pytest.fixture
-def one_answer(monkeypatch):
-    """The network's first answer alone, where four take seconds and say no more."""
-    monkeypatch.setattr(filling, "SETTINGS", replace(filling.SETTINGS, mirrored=((),)))
-
-
-def test_a_slanting_edge_crosses_the_hole():
+def test_a_slanting_edge_crosses_the_hole(one_answer):
     picture, below = two_walls()
     rows, columns = np.indices(below.shape)
     hole = np.hypot(rows - 40, columns - 64) < 16

@@ -41,7 +41,7 @@ def without_the_block(scene):
     return np.clip(render_scene(bare, spp=256, seed=11), 0, 1)
 
 
-def test_the_wall_goes_on_behind_the_block():
+def test_the_wall_goes_on_behind_the_block(one_answer):
     scene = flat_scene(native=3)  # whose hole another test fills, too
     removed = remove(scene, MASK)
     np.testing.assert_allclose(removed.depth[MASK], 3.0, rtol=1e-3)
