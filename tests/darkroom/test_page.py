@@ -173,12 +173,12 @@ def test_select_change_undo_and_reload(page):
     becomes(page, green)
     # Both switches are taken back, then the edit itself, and the selection. Keys that come faster than answers, and
     # more of them than there are changes, are no mistake.
-    for _ in range(20):
+    for _ in range(8):
         page.keyboard.press("Control+z")
     page.wait_for_selector("#steps >> text=No edits yet")
     page.wait_for_selector("#undo:disabled")
     becomes(page, red)
-    for _ in range(20):
+    for _ in range(8):
         page.keyboard.press("Control+Shift+z")
     page.wait_for_selector("#steps >> text=hue 120")
     page.wait_for_selector("#redo:disabled")
