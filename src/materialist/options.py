@@ -24,6 +24,8 @@ DEVICE: dict[str, Any] = {
 }
 _PREDICTOR: dict[str, Any] = {"kind": "name", "metavar": "PREDICTOR"}
 
+TAU = 6.0
+"""Grazing angle below which the surface is cut, degrees (paper, tau)."""
 PATHS = 16
 """Paths a pixel of final pictures, denoised; twice as many score the same (`bench photo-alone`)."""
 
@@ -108,7 +110,7 @@ class InvertOptions(OperationOptions):
     """`floors` continues planes behind what the photo shows, and floors and table tops beyond the frame; `planes` walls
     and ceilings as well, `none` adds nothing."""
     tau: float = option(
-        6.0,
+        TAU,
         "Grazing angle below which the surface is cut, degrees.",
         low=0,
         high=90,

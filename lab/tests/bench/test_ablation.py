@@ -80,3 +80,14 @@ def test_real_photos_need_no_truth(measured, monkeypatch):
         row["psnr"] > 5 and "relit_psnr" not in row and row["sample"].startswith("example:")
         for row in rows
     )
+
+
+def test_a_small_weight_of_the_prior_trades_the_albedo_for_the_rerendering(measured):
+    rows = measured(
+        "ablation", scenes=1, size=32, spp=16, tables="weight", predictor="truth", device="cpu"
+    ).rows
+    psnr = [row["psnr"] for row in rows]
+    albedo = [row["albedo_psnr"] for row in rows]
+    assert [row["method"] for row in rows][:2] == ["albedo of the prior", "albedo's weight 0.01"]
+    # The prior is the truth here: whatever the photo asks for leads away from it.
+    assert psnr[1] > psnr[-1] + 1 and albedo[1] + 1 < albedo[-1] < albedo[0]

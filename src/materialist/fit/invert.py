@@ -25,6 +25,7 @@ from materialist.fit.materials import COLUMNS, fit_materials, material_field, re
 from materialist.fit.optimise import Stop, never
 from materialist.fit.settings import FitSettings, MaterialSettings, MaterialStage
 from materialist.geometry.build import build_geometry
+from materialist.options import TAU
 from materialist.render.scene import RenderScene
 from materialist.transport.cache import CacheSettings
 from materialist.types import Array, Geometry, Materials, Photo, Prediction, Progress
@@ -41,7 +42,7 @@ class FitSetup:
     """`auto` becomes that of the settings."""
     engine: str = "transport"
     envmap_height: int = 256
-    tau: float = 6.0
+    tau: float = TAU
     mask: Array | None = None
     """[H, W] bool: roughness and metallic are one value inside."""
     strategy: str = "default"

@@ -15,6 +15,7 @@ import numpy as np
 from materialist.camera import rays_through
 from materialist.errors import InputError
 from materialist.geometry.cuts import Cuts, find_cuts
+from materialist.options import TAU
 from materialist.types import Array, Camera, Mesh
 
 
@@ -53,7 +54,7 @@ def joined_faces(parts: Sequence[Any]) -> tuple[Array, Array]:
     return np.concatenate([part.vertices for part in parts]), faces
 
 
-def depth_to_mesh(depth: Array, normal: Array, camera: Camera, *, tau: float = 6.0) -> Mesh:
+def depth_to_mesh(depth: Array, normal: Array, camera: Camera, *, tau: float = TAU) -> Mesh:
     """Turn a depth map into a mesh with clean occlusion boundaries.
 
     depth: [H, W] planar depth along -Z, scene units; 0 where there is no surface (left open).

@@ -9,6 +9,7 @@ from materialist.errors import InputError
 from materialist.geometry.boundary import QUAD, depth_to_mesh, face_camera
 from materialist.geometry.completion import complete
 from materialist.geometry.planes import find_planes
+from materialist.options import TAU
 from materialist.types import Array, Camera, Geometry, Mesh, Scene
 
 COMPLETIONS = ("planes", "floors", "none")
@@ -23,7 +24,7 @@ def build_geometry(
     normal: Array,
     camera: Camera,
     *,
-    tau: float = 6.0,
+    tau: float = TAU,
     completion: str = "floors",
     seed: int = 0,
 ) -> Geometry:
@@ -58,7 +59,7 @@ def rebuilt(scene: Scene, depth: Array, normal: Array, camera: Camera) -> Geomet
         depth,
         normal,
         camera,
-        tau=float(provenance.get("tau", 6.0)),
+        tau=float(provenance.get("tau", TAU)),
         completion=completion,
         seed=int(provenance.get("seed", 0) or 0),
     )

@@ -8,7 +8,9 @@ all materials at once, RM&A roughness and metallic first, then albedo. `steps`: 
 half on all. `init`: the material network's first weights. `field`: what the materials are written as, 200 steps;
 `w/o R, M`: roughness and metallic not predicted but 0.5, the smallest L_re on the way. `fov`: true maps and light on
 the mesh of the true depth at a wrong field of view, and the same under another light (relit); of real photos, light and
-materials are fitted (200 steps) at factors on the field of view that is read or assumed.
+materials are fitted (200 steps) at factors on the field of view that is read or assumed. `weight`, of `--preset
+default` in place of the paper's: how much the albedo costs that leaves its prior, and the prior itself; the albedo
+against the truth is sRGB-encoded, after one factor.
 """
 
 from collections.abc import Callable, Iterator
@@ -24,11 +26,12 @@ from materialist import metrics
 from materialist.buffers import placed
 from materialist.edits.core.renderer import rendered
 from materialist.errors import InputError
+from materialist.fit.albedo import solve_albedo
 from materialist.fit.fields import ALL, Rows
 from materialist.fit.invert import FitSetup, FitState, prepare, replaced
 from materialist.fit.losses import encoded_error, rendering_loss
 from materialist.fit.materials import fit_materials, material_field, remapped
-from materialist.fit.settings import PAPER, MaterialSettings, MaterialStage, Schedule
+from materialist.fit.settings import DEFAULT, PAPER, MaterialSettings, MaterialStage, Schedule
 from materialist.io.photo import read_photo
 from materialist.option_kinds import option
 from materialist.predict import get_predictor
@@ -37,6 +40,7 @@ from materialist_lab.bench.batch import chosen
 from materialist_lab.bench.benchmark import COUNT, SIZE, Benchmark, Row, names
 from materialist_lab.bench.edits import sample_and_light, true_scene
 from materialist_lab.bench.report import Column, Report
+from materialist_lab.metrics.maps import score
 from materialist_lab.procedural.synthetic import SyntheticSample
 
 FIELDS = {"mlp": "MLP", "unet": "U-Net", "maps": "direct"}
@@ -53,6 +57,7 @@ class AblationBench(Benchmark):
         Column("mse", "MSE", "lower", 4),
         Column("loss", "L_re", "lower", 4),
         Column("relit_psnr", "relit PSNR", "higher", 2),
+        Column("albedo_psnr", "albedo PSNR", "higher", 2),
         Column("steps", "steps", "", 0),
     )
 
@@ -61,8 +66,9 @@ class AblationBench(Benchmark):
     inits: ClassVar = 5  # first weights
     fovs: ClassVar = (0.8, 1.0, 1.2)  # factors on the true field of view
     short: ClassVar = 200  # steps of every other table, paper
+    weights: ClassVar = (0.01, 0.1, 0.2, 0.3, 0.7, 2.0)  # of the albedo's prior
 
-    tables: str = option("delta,steps,init,field,fov", "With commas.", kind="name")
+    tables: str = option("delta,steps,init,field,fov", "With commas; also weight.", kind="name")
     scenes: int = option(3, "How many photos.", **COUNT)
     photos: bool = option(
         False,
@@ -252,10 +258,38 @@ def _fov(photo: _Photo) -> Iterator[Row]:
         yield {**row, "relit_psnr": metrics.psnr(relit, truth)}
 
 
+def _weight(photo: _Photo) -> Iterator[Row]:
+    """How far the albedo may leave its prior: the default fit's one choice between maps and re-rendering."""
+    bench = photo.bench
+    setup = FitSetup(photo.photo, photo.prior, DEFAULT, seed=bench.seed, device=bench.device)
+    fitting = prepare(setup)
+    # --- The light by the prior's materials, as in an inversion ---
+    state = fitting.start()
+    fitting.fit_light(state, photo.prior.materials)
+    problem = fitting.material_problem(state)
+    target = placed(photo.photo.linear.reshape(-1, 3))[fitting.engine.pixels]
+    # --- The prior, and the albedo of each weight ---
+    albedos = {"albedo of the prior": state.maps}
+    for weight in bench.weights:
+        settings = replace(DEFAULT.materials, weights=(weight, 1.0, 1.0))
+        albedos[f"albedo's weight {weight:g}"], _ = solve_albedo(
+            problem, target, state.maps, settings
+        )
+    for method, maps in albedos.items():
+        materials = replaced(photo.prior.materials, fitting.engine.pixels, maps)
+        picture = fitting.render(materials, state.envmap, bench.spp, bench.seed + 1)
+        row = photo.against_photo(method, picture)
+        if photo.sample is not None:
+            known = replace(photo.prior, materials=materials)
+            row["albedo_psnr"] = score(known, photo.sample.truth)["albedo_psnr"]
+        yield row
+
+
 TABLES: dict[str, Callable[[_Photo], Iterator[Row]]] = {
     "delta": _delta,
     "steps": _steps,
     "init": _init,
     "field": _field,
     "fov": _fov,
+    "weight": _weight,
 }
