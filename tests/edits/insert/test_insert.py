@@ -140,7 +140,7 @@ def test_what_was_rendered_before_changes_nothing(box):
     np.testing.assert_array_equal(again.edited - again.base, fresh.edited - fresh.base)
 
 
-@pytest.mark.parametrize("grey", [0.05, 0.9])
+@pytest.mark.parametrize("grey", [0.05, pytest.param(0.9, marks=pytest.mark.slow)])
 def test_the_shadow_goes_on_to_the_foot(box, grey):
     """What a body leaves of its rim's pixels is the ground in its shadow: neither the body nor the ground beside."""
     scene = floor_scene(96, 72)

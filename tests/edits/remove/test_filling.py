@@ -140,7 +140,7 @@ def test_a_lamp_leaves_the_dark_its_levels(monkeypatch):
     "size",
     [
         (9, 9),
-        (400, 1),
+        pytest.param((400, 1), marks=pytest.mark.slow),
         pytest.param((700, 20), marks=pytest.mark.slow),
         pytest.param((1, 1500), marks=pytest.mark.slow),
     ],

@@ -154,7 +154,13 @@ def far():
     return scene, star.reshape(blocks).mean((1, 3)) > 0.5
 
 
-@pytest.mark.parametrize("prompt", [{"click": (260, 100)}, {"box": (225, 65, 295, 135)}])
+@pytest.mark.parametrize(
+    "prompt",
+    [
+        pytest.param({"click": (260, 100)}, marks=pytest.mark.slow),
+        {"box": (225, 65, 295, 135)},
+    ],
+)
 def test_a_second_look_sharpens_the_border(far, prompt):
     scene, star = far
     once = select(scene, **prompt, sharpen=False)
